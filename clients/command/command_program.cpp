@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "clients/command/stop_raiser.h"
 #include "idl/types/messages/steps.h"
 #include "idl/types/printable_text.h"
@@ -13,10 +15,11 @@ namespace tenon::command {
 namespace {
 
 using std::chrono::milliseconds;
-constexpr std::chrono::seconds kPatience{5};  // for an answer
-constexpr milliseconds kForAServer{3000};     // to repeat an emergency stop, discovery included
-constexpr milliseconds kForRaises{1000};      // for the raises of a stop that the run is in
-constexpr milliseconds kResend{500};          // an answer sent before our reader was matched is lost
+constexpr std::chrono::seconds kPatience{5};   // for an answer
+constexpr milliseconds kForAServer{3000};      // to repeat an emergency stop, discovery included
+constexpr milliseconds kBetweenTellings{500};  // of raises of the emergency stop
+constexpr milliseconds kForRaises{1000};       // to hear of the raises of the emergency stop
+constexpr milliseconds kResend{500};           // an answer sent before our reader was matched is lost
 
 /// Twice is as good as once.
 bool isRepeatable(CommandKind kind) {
@@ -26,6 +29,11 @@ bool isRepeatable(CommandKind kind) {
 
 }  // namespace
 
+std::string describe(const NewestRaise& newest) {
+  return fmt::format("emergency stop by {}: {}{}", printable(newest.who), printable(newest.reason),
+                     newest.standing > 1 ? fmt::format(", the newest of {} raises", newest.standing) : "");
+}
+
 /// False when that does not happen in time.
 bool CommandClient::dispatchUntil(const Stop& stop, std::chrono::steady_clock::duration timeout,
                                   const std::function<bool()>& done) {
@@ -34,6 +42,7 @@ bool CommandClient::dispatchUntil(const Stop& stop, std::chrono::steady_clock::d
     if (stop || std::chrono::steady_clock::now() >= until) return false;
     if (meanwhile_) meanwhile_();
     inbox_.dispatch(milliseconds(20));
+    tellNewest();
   }
   return true;
 }
@@ -69,12 +78,8 @@ Result<void> CommandClient::connect(const Stop& stop) {
   }
   if (all) all = inbox_.on<RunState>(session, wire::kRunState, [this](const RunState& run) { receive(run); });
   if (all) {
-    all = inbox_.on<EmergencyStop>(session, wire::kEmergencyStop,
-                                   [this](const EmergencyStop& stop) { receive(stop); });
-  }
-  if (all) {
-    all = inbox_.on<EmergencyClear>(session, wire::kEmergencyClear,
-                                    [this](const EmergencyClear& cleared) { stops_.clear(cleared); });
+    all = inbox_.on<NewestRaise>(session, wire::kNewestRaise,
+                                 [this](const NewestRaise& newest) { receive(newest); });
   }
   return all ? awaitReader(stop) : all;
 }
@@ -92,21 +97,21 @@ void CommandClient::receive(const RunState& run) {
   run_ = run;
 }
 
-void CommandClient::receive(const EmergencyStop& stop) {
-  if (stops_.raise(stop) && report)
-    report("emergency stop by " + printable(stop.who) + ": " + printable(stop.reason));
+void CommandClient::receive(const NewestRaise& newest) {
+  newest_ = newest;
+  tellNewest();
 }
 
-std::vector<RaiseId> CommandClient::standingRaises() const {
-  std::vector<RaiseId> all;
-  for (const auto& [id, stop] : stops_.standing()) all.push_back(id);
-  return all;
-}
-
-/// Until those that stand are heard, by who has just joined.
-void CommandClient::awaitRaises(const Stop& stop) {
-  (void)dispatchUntil(stop, kForRaises,
-                      [this] { return run_ && (!run_->emergency_stop || stops_.engaged()); });
+/// Of many raises at a rate that a person can read.
+void CommandClient::tellNewest() {
+  if (!newest_ || told_ == newest_->number) return;
+  if (newest_->standing > 0 && report) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_telling_) return;
+    next_telling_ = now + kBetweenTellings;
+    report(describe(*newest_));
+  }
+  told_ = newest_->number;
 }
 
 Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop) {
@@ -123,17 +128,19 @@ Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop)
 }
 
 Result<void> CommandClient::rejoin(const Stop& stop) {
+  newest_.reset();  // of the server that has ended
+  told_ = 0;
   auto back = member_->rejoin(stop, meanwhile_);
   return back ? awaitReader(stop) : back;
 }
 
 Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& stop) {
   ack_.reset();
-  Command message{member_->welcome().client, ++sent_, *command.command, {}, command.text, command.value, {}};
-  if (command.command == CommandKind::kClearEmergencyStop) {
-    if (!command.raises) awaitRaises(stop);
-    message.raises = rangesOf(command.raises ? *command.raises : standingRaises());
-  }
+  const bool is_clear = command.command == CommandKind::kClearEmergencyStop;
+  if (is_clear && !command.value)
+    (void)dispatchUntil(stop, kForRaises, [this] { return newest_.has_value(); });
+  const double value = command.value.value_or(is_clear && newest_ ? newest_->number : 0.0);
+  const Command message{member_->welcome().client, ++sent_, *command.command, {}, command.text, value};
   const auto until = std::chrono::steady_clock::now() + kPatience;
   const auto answered = [&] { return ack_ && ack_->id == message.id; };
   do {
@@ -144,7 +151,7 @@ Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& s
     (void)dispatchUntil(stop, kResend, [&] { return answered() || lost(); });
     if (!answered() && lost()) return fail(*lost());
   } while (!answered());
-  if (!ack_->accepted) return fail("refused: " + ack_->reason);
+  if (!ack_->accepted) return fail("refused: " + printable(ack_->reason));
   return {};
 }
 

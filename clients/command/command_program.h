@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -11,10 +12,12 @@
 #include "clients/command/parser.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/result.h"
-#include "idl/types/stop_truth.h"
 #include "idl/wire/membership.h"
 
 namespace tenon::command {
+
+/// For people: by whom the newest raise was, of how many that stand.
+[[nodiscard]] std::string describe(const NewestRaise& newest);
 
 /// Joins a session and sends commands to its server. The emergency stop is no command: StopRaiser.
 ///
@@ -43,6 +46,7 @@ class CommandClient {
   /// Takes messages for `timeout`.
   void dispatch(std::chrono::milliseconds timeout) {
     inbox_.dispatch(timeout);
+    tellNewest();
     if (lost()) member_->leave();  // nobody comes back to this seat
   }
   [[nodiscard]] bool isOver() const { return run_ && tenon::isOver(run_->phase); }
@@ -53,8 +57,8 @@ class CommandClient {
   /// Membership::rejoin.
   [[nodiscard]] Result<void> rejoin(const Stop& stop);
   [[nodiscard]] const std::string& sessionName() const { return member_->sessionName(); }
-  /// Raises of the emergency stop that stand, as heard so far.
-  [[nodiscard]] std::vector<RaiseId> standingRaises() const;
+  /// NewestRaise::number of the emergency stop, of which `report` was told.
+  [[nodiscard]] std::uint32_t toldRaise() const { return told_; }
 
   /// Called with one line per change of step or run; may be empty.
   std::function<void(const std::string&)> report;
@@ -68,8 +72,8 @@ class CommandClient {
                      const std::function<bool()>& done);
   Result<void> sendOnce(const ParsedCommand& command, const Stop& stop);
   void receive(const RunState& run);
-  void receive(const EmergencyStop& stop);
-  void awaitRaises(const Stop& stop);
+  void receive(const NewestRaise& newest);
+  void tellNewest();
 
   wire::MembershipOptions options_;
   std::function<void()> meanwhile_;
@@ -79,7 +83,9 @@ class CommandClient {
   std::optional<CommandAck> ack_;
   std::string step_;  ///< name of the active one
   std::optional<RunState> run_;
-  StopTruth stops_;
+  std::optional<NewestRaise> newest_;
+  std::uint32_t told_ = 0;  ///< number of the newest raise that was told
+  std::chrono::steady_clock::time_point next_telling_{};
   wire::Inbox inbox_;
 };
 

@@ -106,7 +106,7 @@ class KeyDesk {
  private:
   struct Pressed {
     char key = 0;
-    std::vector<RaiseId> seen;  ///< raises of the emergency stop that were told of before: a clear names them
+    std::uint32_t newest_raise = 0;  ///< of the emergency stop, that was told by then
   };
 
   static int report(const std::string& what) {
@@ -133,7 +133,7 @@ class KeyDesk {
         continue;
       }
       if (!is_coming_back_ && (keys_.size() < kMostKeys || is_input_over_))
-        keys_.push_back({key, client_ ? client_->standingRaises() : std::vector<RaiseId>{}});
+        keys_.push_back({key, client_ ? client_->toldRaise() : 0});
       else if (parseCommand(key, signals_))
         show(is_coming_back_ ? "not sent: the server is gone" : "not sent: too many keys wait");
     }
@@ -235,7 +235,7 @@ class KeyDesk {
     asked_ = asks ? command : std::nullopt;
     if (asks) show(nameOf(*command) + ": press y to do it, any other key not to");
     if (!command || asks) return;
-    command->raises = pressed.seen;
+    if (command->command == CommandKind::kClearEmergencyStop) command->value = pressed.newest_raise;
     is_interrupted_ = ended_.load();
     const auto sent =
         is_outside_ ? fail("not sent: " + why_outside_) : client_->send(*command, is_interrupted_);
@@ -265,6 +265,12 @@ class KeyDesk {
 int commandOnce(CommandClient& client, const std::vector<std::string>& arguments,
                 const std::atomic<bool>& stop) {
   const auto command = parseCommand(arguments);
+  const bool is_clear = command && command->command == CommandKind::kClearEmergencyStop;
+  // what was not shown before is shown beside what becomes of it
+  if (is_clear)
+    client.report = [](const std::string& line) {
+      if (line.starts_with("emergency")) show(line);
+    };
   const Result<void> sent = command ? client.send(*command, stop) : fail(command.error().what);
   if (sent) {
     show(nameOf(*command) + ": accepted");

@@ -28,9 +28,9 @@ struct CommandWord {
 struct ParsedCommand {
   std::optional<CommandKind> command;  ///< none: emergency stop
   std::string text;                    ///< name or reason; of `collision` both objects, separated by a space
-  double value = 0.0;                  ///< [-] of `collision`: 1 on, 0 off
-  /// Of `clear`: the raises of the emergency stop that who gave it saw; none: those heard when it is sent.
-  std::optional<std::vector<RaiseId>> raises;
+  /// [-] of `collision`: 1 on, 0 off; of `clear`: NewestRaise::number, of which who gives it was told; none:
+  /// of what is heard when it is sent.
+  std::optional<double> value;
 };
 
 /// Parses the words of a command line, as in {"signal", "bell"}. Fails with a sentence that has the usage.

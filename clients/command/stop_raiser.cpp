@@ -66,14 +66,11 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
                                                     wire::sessionPartition(session.empty() ? "*" : session));
   Result<void> all = openInto(self.stops_, *self.session_, wire::kEmergencyStop);
   if (all)
-    all = self.inbox_.onFrom<EmergencyStop>(
-        *self.session_, wire::kEmergencyStop, [&self](const EmergencyStop& stop, const wire::Origin& from) {
-          const auto raise = self.raises_.find(stop.counter);
-          if (stop.client_guid != self.guid_ || raise == self.raises_.end() || from == self.own_) return;
-          std::vector<wire::Origin>& repeaters = raise->second.repeaters;
-          if (from.known() && repeaters.size() < kMostRepeaters && !contains(repeaters, from))
-            repeaters.push_back(from);
-        });
+    all = self.inbox_.onFrom<EmergencyStop>(*self.session_, wire::kEmergencyStop,
+                                            [&self](const EmergencyStop& stop, const wire::Origin& from) {
+                                              if (stop.client_guid == self.guid_ && from != self.own_)
+                                                self.repeat(stop.counter, from);
+                                            });
   if (all)
     all = self.inbox_.onFrom<SessionAnnounce>(
         *self.lobby_, wire::kSessionAnnounce,
@@ -97,8 +94,9 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
     all = self.inbox_.onFrom<EmergencyClear>(
         *self.session_, wire::kEmergencyClear,
         [&self](const EmergencyClear& cleared, const wire::Origin& from) {
-          if (cleared.client_guid == self.guid_ && self.isServer(from))
-            static_cast<void>(self.stops_->dispose({cleared.client_guid, cleared.counter, {}, {}}));
+          if (cleared.client_guid != self.guid_ || !self.isServer(from)) return;
+          self.repeat(cleared.counter, from);  // the server has heard it, also where others stand for it
+          static_cast<void>(self.stops_->dispose({cleared.client_guid, cleared.counter, {}, {}}));
         });
   if (!all) return fail(all.error().what);
   // DDS matches this program's own reader at once, and may know of one of another program by now
@@ -125,6 +123,15 @@ Result<std::uint32_t> StopRaiser::write(const std::string& reason) {
   raises_.insert_or_assign(counter_, Raise{std::chrono::steady_clock::now(), {}});
   if (raises_.size() > kKept) raises_.erase(raises_.begin());
   return counter_;
+}
+
+/// Has heard it.
+void StopRaiser::repeat(std::uint32_t raise, const wire::Origin& from) {
+  const auto found = raises_.find(raise);
+  if (found == raises_.end()) return;
+  std::vector<wire::Origin>& repeaters = found->second.repeaters;
+  if (from.known() && repeaters.size() < kMostRepeaters && !contains(repeaters, from))
+    repeaters.push_back(from);
 }
 
 bool StopRaiser::isServer(const wire::Origin& origin) const {

@@ -65,6 +65,7 @@ class StopRaiser {
   };
 
   StopRaiser() = default;
+  void repeat(std::uint32_t raise, const wire::Origin& from);
   [[nodiscard]] bool isServer(const wire::Origin& origin) const;
   [[nodiscard]] std::size_t silentSessions(const std::vector<wire::Origin>& repeaters) const;
 

@@ -183,7 +183,7 @@ void Desk::handle(ViewerId viewer, const std::string& session, const DeskRequest
     answer.text = parsed.error().what;
     return answer_(viewer, answer);
   }
-  parsed->raises = request.raises;
+  if (parsed->command == CommandKind::kClearEmergencyStop) parsed->value = request.newest_raise;
   const std::scoped_lock lock(mutex_);
   if (!parsed->command) {
     for (const auto& [of, seat] : seats_)

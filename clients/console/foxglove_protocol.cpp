@@ -22,7 +22,6 @@ std::optional<std::uint32_t> number(const nlohmann::json& object, const char* ke
 
 constexpr std::size_t kMaxWords = 8;
 constexpr std::size_t kMostHands = 2;
-constexpr std::size_t kMostRaises = StopTruth::kMostInAll;
 
 /// Its text; empty when there is none.
 std::string text(const nlohmann::json& object, const char* key) {
@@ -40,19 +39,6 @@ Result<std::vector<std::string>> texts(const nlohmann::json& object, const char*
   for (const nlohmann::json& entry : *list) {
     if (!entry.is_string()) return fail("an entry of '" + std::string(key) + "' that is no text");
     all.push_back(entry.get<std::string>());
-  }
-  return all;
-}
-
-/// A list of raises of the emergency stop.
-Result<std::vector<RaiseId>> raises(const nlohmann::json& list) {
-  if (!list.is_array() || list.size() > kMostRaises)
-    return fail("'raises' that are no list of at most " + std::to_string(kMostRaises));
-  std::vector<RaiseId> all;
-  for (const nlohmann::json& entry : list) {
-    const auto counter = entry.is_object() ? number(entry, "counter") : std::nullopt;
-    if (!counter) return fail("an entry of 'raises' without a number 'counter'");
-    all.push_back({text(entry, "client_guid"), *counter});
   }
   return all;
 }
@@ -77,11 +63,7 @@ Result<DeskRequest> parseDesk(const nlohmann::json& json, std::string_view op) {
     auto words = texts(json, "words", kMaxWords);
     if (!words) return fail(words.error().what);
     request.words = std::move(*words);
-    if (const auto list = json.find("raises"); list != json.end()) {
-      auto named = raises(*list);
-      if (!named) return fail(named.error().what);
-      request.raises = std::move(*named);
-    }
+    request.newest_raise = number(json, "newestRaise");
   }
   if (request.kind == Kind::kTakePart) {
     auto hands = texts(json, "hands", kMostHands);

@@ -44,9 +44,9 @@ struct DeskRequest {
   std::string name;                ///< likewise: for display
   std::string key;                 ///< likewise: the session's, or the pass of this gateway; may be empty
   std::vector<std::string> words;  ///< of kCommand: as `tenon command` takes them
-  /// Of the command `clear`: the raises of the emergency stop that its sender saw; none: those of the
-  /// gateway.
-  std::optional<std::vector<RaiseId>> raises;
+  /// Of the command `clear`: NewestRaise::number, of which its sender was told; none: of what the gateway
+  /// hears.
+  std::optional<std::uint32_t> newest_raise;
   std::vector<std::string> hands;  ///< of kTakePart: names in the scenario
 
   [[nodiscard]] bool isOfHands() const { return kind == Kind::kTakePart || kind == Kind::kLeaveHands; }

@@ -25,7 +25,7 @@ constexpr std::array kForwarded{
     wire::kTelemetry.name,      wire::kStepState.name,       wire::kStepProgress.name,
     wire::kRunState.name,       wire::kGrabState.name,       wire::kPresence.name,
     wire::kRecorderStatus.name, wire::kEmergencyStop.name,   wire::kEmergencyClear.name,
-    wire::kEventLog.name,       wire::kClientEvent.name};
+    wire::kNewestRaise.name,    wire::kEventLog.name,        wire::kClientEvent.name};
 
 Delivery deliveryOf(std::string_view topic) {
   const bool is_event = topic == wire::kEventLog.name || topic == wire::kClientEvent.name;

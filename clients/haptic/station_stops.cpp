@@ -1,5 +1,7 @@
 #include "clients/haptic/station_stops.h"
 
+#include "idl/types/printable_text.h"
+
 namespace tenon::haptic {
 
 Result<void> StationStops::subscribe() {
@@ -16,10 +18,15 @@ void StationStops::raise(const EmergencyStop& stop) {
   const StopChange change = truth_.raise(stop);
   if (!change) return;
   tell();
-  if (change.superseded)
-    static_cast<void>(link_.withdraw({change.superseded->client_guid, change.superseded->counter, {}, {}}));
-  callbacks_.print("emergency stop by " + stop.who + ": " + stop.reason);
+  if (change.superfluous) return;
+  say("emergency stop by " + stop.who + ": " + stop.reason);
   static_cast<void>(link_.send(stop));
+}
+
+/// Of who raises or clears many, once.
+void StationStops::say(const std::string& text) {
+  if (text != said_) callbacks_.print(printable(text));
+  said_ = text;
 }
 
 void StationStops::clear(const EmergencyClear& cleared) {
@@ -29,7 +36,7 @@ void StationStops::clear(const EmergencyClear& cleared) {
   truth_.clear(cleared);
   if (!stood) return;
   tell();
-  callbacks_.print("emergency stop cleared by " + cleared.who + ": " + cleared.reason);
+  say("emergency stop cleared by " + cleared.who + ": " + cleared.reason);
   if (!truth_.engaged() && reads_keys_) callbacks_.print("press return to continue at this station");
 }
 

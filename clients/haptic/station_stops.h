@@ -30,12 +30,14 @@ class StationStops {
  private:
   void raise(const EmergencyStop& stop);
   void clear(const EmergencyClear& cleared);
+  void say(const std::string& text);
   void tell() const { callbacks_.changed({truth_.raised(), truth_.engaged()}); }
 
   StationLink& link_;
   Callbacks callbacks_;
   bool reads_keys_ = false;
   StopTruth truth_;
+  std::string said_;  ///< the last line
 };
 
 }  // namespace tenon::haptic

@@ -92,11 +92,6 @@ void fields(auto& d, auto& c, Is<PairContact> auto& m) {
   d("peak_force", c.peak_force, m.peak_force);
   d("peak_depth", c.peak_depth, m.peak_depth);
 }
-void fields(auto& d, auto& c, Is<RaiseRange> auto& m) {
-  d("client_guid", c.client_guid, m.client_guid);
-  d("first", c.first, m.first);
-  d("last", c.last, m.last);
-}
 void fields(auto& d, auto& c, Is<LocalizedText> auto& m) {
   d("language", c.language, m.language);
   d("text", c.text, m.text);
@@ -401,6 +396,12 @@ void fields(auto& d, auto& c, Is<RecorderStatus> auto& m) {
   d("lost", c.lost, m.lost);
   d("problem", c.problem, m.problem);
 }
+void fields(auto& d, auto& c, Is<NewestRaise> auto& m) {
+  d("number", c.number, m.number);
+  d("standing", c.standing, m.standing);
+  d("who", c.who, m.who);
+  d("reason", c.reason, m.reason);
+}
 template <class M>
 concept StopMessage = Is<M, EmergencyStop> || Is<M, EmergencyClear>;
 void fields(auto& d, auto& c, StopMessage auto& m) {
@@ -416,7 +417,6 @@ void fields(auto& d, auto& c, Is<Command> auto& m) {
   d("hand", c.hand_id, m.hand);
   d("text", c.text, m.text);
   d("value", c.value, m.value);
-  d.list("raises", c.raises, m.raises, kMostRanges, kStructs);
 }
 void fields(auto& d, auto& c, Is<CommandAck> auto& m) {
   d("client", c.client_id, m.client);

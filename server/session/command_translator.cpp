@@ -68,7 +68,7 @@ CommandTranslator::Decision CommandTranslator::changeFor(const Command& command,
         return refuse(Refusal::kNotYourHand, "you do not control both hands");
       return gameChange(command);
     case CommandKind::kClearEmergencyStop:
-      return clearStopChange(context);
+      return clearStopChange(command, context);
     default:
       return leadChange(command, context);
   }
@@ -117,15 +117,17 @@ CommandTranslator::Decision CommandTranslator::handOverChange(const Command& com
   return change;
 }
 
-CommandTranslator::Decision CommandTranslator::clearStopChange(const CommandContext& context) const {
+CommandTranslator::Decision CommandTranslator::clearStopChange(const Command& command,
+                                                               const CommandContext& context) const {
   if (!context.is_stop_engaged) return refuse(Refusal::kAlready, "there is no emergency stop");
   if (context.role == Role::kAdmin && context.is_instructor_present)
     return refuse(Refusal::kNotPermitted,
                   "an instructor is present: it is for the instructor to clear the emergency stop");
-  if (context.unnamed != nullptr)
-    return refuse(Refusal::kRaisedAgain,
-                  fmt::format("it was raised again, by {}: {}; look, then clear it again",
-                              context.unnamed->who, context.unnamed->reason));
+  if (command.value < context.newest.number)
+    return refuse(
+        Refusal::kRaisedAgain,
+        fmt::format("a newer raise stands than those you were told of, by {}: {}; look, then clear it",
+                    printable(context.newest.who), printable(context.newest.reason)));
   return Change{.kind = ChangeKind::kSetEmergencyStop, .value = 0.0};
 }
 

@@ -15,9 +15,9 @@ namespace tenon::session {
 /// Who gives a command, and in what session.
 struct CommandContext {
   Role role = Role::kObserver;
-  std::span<const ClientId> controllers;   ///< of each hand, index = HandId; valid during the call
-  bool is_stop_engaged = false;            ///< emergency stop
-  const EmergencyStop* unnamed = nullptr;  ///< a raise that the clear does not name; null: none
+  std::span<const ClientId> controllers;  ///< of each hand, index = HandId; valid during the call
+  bool is_stop_engaged = false;           ///< emergency stop
+  NewestRaise newest;                     ///< of it
   bool is_instructor_present = false;
 };
 
@@ -41,7 +41,7 @@ class CommandTranslator {
   [[nodiscard]] Decision collisionChange(const Command& command) const;
   [[nodiscard]] Decision handOverChange(const Command& command, const CommandContext& context) const;
   [[nodiscard]] Decision releaseChange(const Command& command, const CommandContext& context) const;
-  [[nodiscard]] Decision clearStopChange(const CommandContext& context) const;
+  [[nodiscard]] Decision clearStopChange(const Command& command, const CommandContext& context) const;
   [[nodiscard]] int findStep(std::string_view text) const;
   [[nodiscard]] int findPair(std::string_view a, std::string_view b) const;
   [[nodiscard]] bool controlsBothHands(ClientId client, const CommandContext& context) const;

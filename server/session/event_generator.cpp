@@ -142,9 +142,11 @@ void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
   run.steps_skipped = output.step.skipped;
   run.steps_timed_out = output.step.timed_out;
   if (output.phase >= RunPhase::kSucceeded) run.final_hash = output.hash;
-  run_reason_ = run.reason;
   const bool is_error = output.phase == RunPhase::kFailed || output.emergency_stop;
-  events.log.push_back(makeEvent(is_error ? Severity::kError : Severity::kInfo, "run", run.reason));
+  // a pause within a stop is the same to people
+  if (run.reason != run_reason_)
+    events.log.push_back(makeEvent(is_error ? Severity::kError : Severity::kInfo, "run", run.reason));
+  run_reason_ = run.reason;
   events.run = std::move(run);
 }
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t kMostWaiting = 512;
 constexpr std::chrono::seconds kBetweenNotices{1};
+constexpr std::chrono::seconds kForPresence{10};  // two leases of a lockstep link
 
 }  // namespace
 
@@ -48,6 +49,18 @@ void Reception::step() {
   }
   finishKicks();
   dismissStuckRecorders();
+  dismissUnheard();
+}
+
+/// Of who ended or hung before the presence was heard, DDS tells no end.
+void Reception::dismissUnheard() {
+  const auto late = std::find_if(unheard_.begin(), unheard_.end(), [](const auto& one) {
+    return std::chrono::steady_clock::now() >= one.second;
+  });
+  if (late == unheard_.end()) return;
+  const ClientId client = late->first;
+  unheard_.erase(late);
+  handleGone(client);
 }
 
 void Reception::admit(const Join& join, const wire::Origin& from) {
@@ -82,6 +95,7 @@ void Reception::admit(const Join& join, const wire::Origin& from) {
                            .client = welcome.client,
                            .tick = now_});
   callbacks.seated(welcome);
+  if (welcome.accepted) unheard_[welcome.client] = std::chrono::steady_clock::now() + kForPresence;
   if (welcome.accepted && seats_ != nullptr) seats_->keep(registry_.seatsToKeep());
   if (welcome.accepted && copies_ != nullptr && join.role == Role::kRecorder)
     copies_->admit(welcome.client, from, join.recorded_until);
@@ -96,6 +110,7 @@ void Reception::dismiss(ClientId client, const std::string& why) {
   if (leaver == nullptr || !leaver->alive) return;
   const std::string text = fmt::format("{} ({}) {}", leaver->name, roleName(leaver->role), why);
   registry_.leave(client);
+  unheard_.erase(client);
   if (copies_ != nullptr && leaver->role == Role::kRecorder) copies_->dismiss(client);
   seat_lost_notified_.erase(client);  // of an earlier presence
   notifySeatLost(client, why);

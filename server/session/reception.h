@@ -58,6 +58,8 @@ class Reception {
 
   /// Queues a request; the program repeats one that finds no room.
   void receive(const Join& join, const wire::Origin& from);
+  /// The presence of `client` was heard: from now on its end is noticed.
+  void handlePresent(ClientId client) { unheard_.erase(client); }
   /// The presence of `client` has ended.
   void handleGone(ClientId client);
   /// Removes a client from the session, notifies it, and logs "Ada (trainee) <why>".
@@ -80,6 +82,7 @@ class Reception {
 
  private:
   void admit(const Join& join, const wire::Origin& from);
+  void dismissUnheard();
   void finishKicks();
   void dismissStuckRecorders();
 
@@ -90,7 +93,9 @@ class Reception {
   JournalCopies* copies_;
   wire::SharedKey challenges_ = wire::SharedKey::random();  ///< what challenges are made of
   std::deque<std::pair<Join, wire::Origin>> joins_;         ///< waiting
-  std::deque<ClientId> leaves_;                             ///< waiting
+  /// With a seat, and without a presence since; by when it must be heard.
+  std::map<ClientId, std::chrono::steady_clock::time_point> unheard_;
+  std::deque<ClientId> leaves_;  ///< waiting
   struct Kick {
     Command command;
     CommandAck ack;

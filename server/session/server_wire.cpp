@@ -154,6 +154,9 @@ Result<void> ServerWire::openReaders() {
   listenTo(session_, wire::kExternalPose, [this, take](const ExternalPose& pose, const wire::Origin& from) {
     if (isGenuine(pose.client, from, "pose")) take(pose.client, registry_.validateExternalPose(pose));
   });
+  listenTo(session_, wire::kPresence, [this](const Presence& presence, const wire::Origin& from) {
+    if (registry_.ownsSeat(presence.client, from)) reception_->handlePresent(presence.client);
+  });
   if (result) {
     result = inbox_.onGoneFrom<Presence>(
         session_, wire::kPresence,
@@ -307,13 +310,12 @@ void ServerWire::handle(const Command& command, const wire::Origin& from) {
   }
   const Presence* sender = registry_.findClient(command.client);
   const std::string who = sender != nullptr ? sender->name : fmt::format("client {}", command.client.value);
-  const CommandAck ack = registry_.handleCommand(command, stops_.otherThan(command.raises));
+  const CommandAck ack = registry_.handleCommand(command, stops_.newest());
   if (!reception_->dismissKicked(command, ack, who)) answer(command, ack, who);
 }
 
 void ServerWire::answer(const Command& command, const CommandAck& ack, const std::string& who) {
   writers_->ack.send(ack);
-  if (ack.refusal == Refusal::kRaisedAgain) stops_.clear(command.raises, who, command.text);
   if (!ack.accepted) {
     logRefusal(fmt::format("{}: '{}': {}", who, commandName(command.kind), ack.reason));
   } else if (command.kind == CommandKind::kNote) {
@@ -346,7 +348,7 @@ void ServerWire::engage(const EmergencyStop& stop) {
   stops_.publish(stop);
   const std::string text = fmt::format("engaged by {}: {}", stop.who, stop.reason);
   // of somebody who raises it without end, at a bounded rate
-  if (!change.superseded || refusals_.add(text, std::chrono::steady_clock::now()))
+  if (!change.superfluous || refusals_.add(text, std::chrono::steady_clock::now()))
     log(Severity::kError, "emergency stop", text);
 }
 
@@ -361,7 +363,7 @@ void ServerWire::logStandingStops() {
 
 void ServerWire::clearEmergencyStop(const Command& command, const std::string& who) {
   const std::string& reason = command.text;
-  stops_.clear(command.raises, who, reason);
+  stops_.clear(who, reason);
   const char* const next = registry_.phase() == RunPhase::kWaitingForPeople
                                ? "the session still waits for people"
                                : "the session is paused until 'resume'";

@@ -117,12 +117,14 @@ struct ServerWriters {
   TopicWriter<ClockSync> clock{wire::kClockSync, {}};
   TopicWriter<EmergencyStop> stop{wire::kEmergencyStop, {}};
   TopicWriter<EmergencyClear> clear{wire::kEmergencyClear, {}};
+  TopicWriter<NewestRaise> newest_raise{wire::kNewestRaise, {}};
   TopicWriter<PublishedSamples> published{wire::kPublishedSamples, {}};
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
     return std::tie(frame_1k, frame_100, frame_30, pairs, stats, snapshot, object, hand, scene_step, step,
-                    progress, run, grab, matrix, ack, guidance, event, clock, stop, clear, published);
+                    progress, run, grab, matrix, ack, guidance, event, clock, stop, clear, newest_raise,
+                    published);
   }
   auto ofHands() { return std::tie(manifold, manifold_50); }
   /// Written in ticks by send(OutgoingMessages), with the tick in each sample, and recorded.

@@ -318,11 +318,11 @@ Result<Change> SessionRegistry::validateExternalPose(const ExternalPose& pose) c
   return checkedPose(pose, scenario_);
 }
 
-CommandAck SessionRegistry::handleCommand(const Command& command, const EmergencyStop* unnamed) {
+CommandAck SessionRegistry::handleCommand(const Command& command, const NewestRaise& newest) {
   const Presence* who = findClient(command.client);
   if (who == nullptr || !who->alive)
     return {command.client, command.id, false, "join first", Refusal::kNotJoined};
-  CommandAck ack = decide(command, who->role, unnamed);
+  CommandAck ack = decide(command, who->role, newest);
   seats_[command.client.value - 1].last_ack = ack;
   return ack;
 }
@@ -334,7 +334,7 @@ const CommandAck* SessionRegistry::previousAck(const Command& command) const {
   return ack.id == command.id && command.id != 0 ? &ack : nullptr;
 }
 
-CommandAck SessionRegistry::decide(const Command& command, Role role, const EmergencyStop* unnamed) {
+CommandAck SessionRegistry::decide(const Command& command, Role role, const NewestRaise& newest) {
   const auto answer = [&](const tl::expected<void, Refused>& done) {
     return done ? CommandAck{command.client, command.id, true, {}, Refusal::kNone}
                 : CommandAck{command.client, command.id, false, shortened(done.error().what, kMostReason),
@@ -351,7 +351,7 @@ CommandAck SessionRegistry::decide(const Command& command, Role role, const Emer
       translator_.changeFor(command, {.role = role,
                                       .controllers = controllers_,
                                       .is_stop_engaged = isStopEngaged(),
-                                      .unnamed = unnamed,
+                                      .newest = newest,
                                       .is_instructor_present = isRolePresent(Role::kInstructor)});
   if (!change) return answer(tl::unexpected(change.error()));
   if (const auto possible = gate_.check(command.kind); !possible) return answer(possible);

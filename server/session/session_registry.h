@@ -72,9 +72,8 @@ class SessionRegistry {
   /// Whether the seat of `client` was given to the participant `origin`.
   [[nodiscard]] bool ownsSeat(ClientId client, const wire::Origin& origin) const;
   /// Checks the command against role, hand and run phase. An accepted one becomes a Change and takes effect;
-  /// one that cannot take effect now is refused with a reason. `unnamed`: a raise of the emergency stop that
-  /// would stand after a clear, because the command does not name it; null: none.
-  [[nodiscard]] CommandAck handleCommand(const Command& command, const EmergencyStop* unnamed = nullptr);
+  /// one that cannot take effect now is refused with a reason. `newest`: of the emergency stop.
+  [[nodiscard]] CommandAck handleCommand(const Command& command, const NewestRaise& newest = {});
   /// The acknowledgement of a command that is received again because its ack was lost; null for a new one.
   [[nodiscard]] const CommandAck* previousAck(const Command& command) const;
   /// What a station has measured of its link. Of unknown clients it is ignored.
@@ -164,7 +163,7 @@ class SessionRegistry {
   [[nodiscard]] HandStiffness stiffnessOf(const Join& join, std::size_t index) const;
   [[nodiscard]] std::size_t newSeat();
   void assignSeat(const Join& join, Welcome& welcome, const wire::Origin& from);
-  [[nodiscard]] CommandAck decide(const Command& command, Role role, const EmergencyStop* unnamed);
+  [[nodiscard]] CommandAck decide(const Command& command, Role role, const NewestRaise& newest);
   [[nodiscard]] static tl::expected<void, Refused> checkNote(const Command& command);
   [[nodiscard]] tl::expected<void, Refused> kick(const Command& command, Role role);
   [[nodiscard]] tl::expected<ClientId, Refused> findPerson(const std::string& text) const;

@@ -22,7 +22,7 @@ namespace tenon::session {
 /// not come back with a stop that clients were told is over, nor without one, unless it is killed in the
 /// milliseconds in which the raise is written (docs/safety.md).
 ///
-/// Raises that end by the bounds of StopTruth are published as cleared: the newer ones stand.
+/// Raises beyond the bounds of StopTruth are published as cleared: those before them stand.
 ///
 /// Threads: one (wire), which never waits for the disk; another one, of this object, writes the file.
 /// Real-time: no.
@@ -33,16 +33,14 @@ class StopKeeper {
 
   /// Takes what the file has, and publishes it. Fails when the file is damaged.
   [[nodiscard]] Result<void> restore();
-  /// True when this raise now stands and did not before: then publish() follows, once the simulation is
-  /// stopped.
+  /// True when this raise is new (StopTruth): then publish() follows, once the simulation is stopped.
   [[nodiscard]] StopChange raise(const EmergencyStop& stop) { return note(truth_.raise(stop)); }
-  /// Of a raise that stands.
+  /// Of what raise() has told: as a raise that stands, or as superfluous.
   void publish(const EmergencyStop& stop);
-  /// A raise that stands and that is not of `named`; null when there is none.
-  [[nodiscard]] const EmergencyStop* otherThan(const std::vector<RaiseRange>& named) const;
-  /// Clears those of the raises that stand: one that is on its way will stand.
-  void clear(const std::vector<RaiseRange>& named, const std::string& who, const std::string& reason);
+  /// Clears all raises that stand, and those alone: one that is on its way will stand.
+  void clear(const std::string& who, const std::string& reason);
   [[nodiscard]] bool engaged() const { return truth_.engaged(); }
+  [[nodiscard]] const NewestRaise& newest() const { return newest_; }
   [[nodiscard]] const std::map<RaiseId, EmergencyStop>& standing() const { return truth_.standing(); }
   /// Whether this raise was cleared before: it would not stand.
   [[nodiscard]] bool wasCleared(const EmergencyStop& stop) const {
@@ -58,10 +56,12 @@ class StopKeeper {
 
  private:
   StopChange note(StopChange change);
+  void tellNewest();
 
   std::filesystem::path file_;
   ServerWriters& writers_;
   StopTruth truth_;
+  NewestRaise newest_;
   bool has_changed_ = false;  ///< since the newest state that the file was given
   bool is_writing_ = false;
   std::uint64_t number_ = 0;             ///< of the newest state that the file was given

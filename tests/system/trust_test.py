@@ -275,8 +275,10 @@ class EmergencyStop(unittest.TestCase):
                 self.assertEqual(press("p"), "pause: accepted\n")
                 # a machine that sleeps: it has heard nothing of the loss
                 keys.send_signal(signal.SIGSTOP)
-                server.wait_for(r"command line \(instructor\) has left", 30)
-                keys.send_signal(signal.SIGCONT)
+                try:
+                    server.wait_for(r"command line \(instructor\) has left", 30)
+                finally:
+                    keys.send_signal(signal.SIGCONT)
                 end = time.monotonic() + 30
                 while (said := press("r")) != "resume: accepted\n":
                     self.assertLess(time.monotonic(), end, said)

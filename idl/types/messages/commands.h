@@ -1,13 +1,10 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "idl/types/ids.h"
-#include "idl/types/messages/run.h"
 
 /// Requests to the session.
 namespace tenon {
@@ -23,7 +20,8 @@ enum class CommandKind : std::uint32_t {
   kSwapHands,     ///< the trainee's two coupled hands exchange their objects
   kSetCollision,  ///< text "a b": names of the pair; value 0: off, 1: on
   kStop,
-  kClearEmergencyStop,  ///< clears `raises`; once none stands the run is paused
+  kClearEmergencyStop,  ///< value: of NewestRaise, of which its sender was told; clears the stop, unless a
+                        ///< newer raise stands; the run is paused then
   kGoToStep,            ///< text: name or number, from 1, of a step; the scene is as at its begin
   kBack,                ///< to the step before, likewise
   kRepeatStep,          ///< the current step from its begin
@@ -76,11 +74,8 @@ enum class Refusal : std::uint32_t {
   kNobodyThere,   ///< nobody moves the hand
   kTooMany,       ///< commands wait for their tick: it can be sent again soon
   kStopped,       ///< an emergency stop stands
-  kRaisedAgain,   ///< what a clear names is cleared, and another raise stands
+  kRaisedAgain,   ///< a raise stands that is newer than those that a clear names
 };
-
-/// Of raises of the emergency stop that one clear names.
-inline constexpr std::size_t kMostRanges = 12;
 
 /// A client's request to the session, acknowledged by a CommandAck with the same id.
 struct Command {
@@ -89,8 +84,7 @@ struct Command {
   CommandKind kind = CommandKind::kFulfilled;
   HandId hand;
   std::string text;
-  double value = 0.0;              ///< [-] by kind
-  std::vector<RaiseRange> raises;  ///< of kClearEmergencyStop: those that its sender saw; at most kMostRanges
+  double value = 0.0;  ///< [-] by kind
 };
 
 struct CommandAck {

@@ -59,23 +59,20 @@ struct RaiseId {
   auto operator<=>(const RaiseId&) const = default;
 };
 
-/// Raises of one client.
-struct RaiseRange {
-  std::string client_guid;
-  std::uint32_t first = 0;  ///< counter
-  std::uint32_t last = 0;   ///< likewise, `first` or more
-
-  [[nodiscard]] bool contains(const RaiseId& raise) const {
-    return raise.client_guid == client_guid && first <= raise.counter && raise.counter <= last;
-  }
-  bool operator==(const RaiseRange&) const = default;
-};
-
 /// The end of one raise, by the server alone.
 struct EmergencyClear {
   std::string client_guid;    ///< of the raise
   std::uint32_t counter = 0;  ///< of the raise
   std::string who;            ///< cleared it
+  std::string reason;
+};
+
+/// The newest raise that has come to stand at the server. A clear names all raises up to its number, so those
+/// that its sender has not been told of stand.
+struct NewestRaise {
+  std::uint32_t number = 0;    ///< counts from 1 in this life of the server; 0: there was none
+  std::uint32_t standing = 0;  ///< raises that stand
+  std::string who;
   std::string reason;
 };
 

@@ -43,7 +43,7 @@ void runServer(std::uint32_t domain, std::uint32_t epoch, bool answers) {
   while (true) inbox.dispatch(std::chrono::seconds(1));
 }
 
-/// A server that is stopped by three raises, and answers whether a clear names them all.
+/// A server that is stopped, and answers whether a clear names its newest raise.
 void runStoppedServer(std::uint32_t domain) {
   auto participant = test::participant(domain);
   wire::Partition lobby(participant, wire::kLobby);
@@ -52,12 +52,9 @@ void runStoppedServer(std::uint32_t domain) {
   auto welcomes = wire::Writer<Welcome>::open(lobby, wire::kWelcome);
   auto acks = wire::Writer<CommandAck>::open(session, wire::kCommandAck);
   auto runs = wire::Writer<RunState>::open(session, wire::kRunState);
-  auto stops = wire::Writer<EmergencyStop>::open(session, wire::kEmergencyStop);
-  auto clears = wire::Writer<EmergencyClear>::open(session, wire::kEmergencyClear);
-  if (!announces || !welcomes || !acks || !runs || !stops || !clears) _exit(1);
-  (void)runs->write({.emergency_stop = true});
-  for (const std::uint32_t counter : {1U, 2U, 3U, 4U}) (void)stops->write({"Ben", counter, "Ben", "caught"});
-  (void)clears->write({"Ben", 2, "Ada", "seen to"});
+  auto raises = wire::Writer<NewestRaise>::open(session, wire::kNewestRaise);
+  if (!announces || !welcomes || !acks || !runs || !raises) _exit(1);
+  (void)raises->write({.number = 7, .standing = 3, .who = "Ben", .reason = "caught"});
   (void)announces->write({.session = "test", .server_epoch = 7});
   wire::Inbox inbox;
   auto heard = inbox.on<Join>(lobby, wire::kJoin, [&](const Join& join) {
@@ -69,8 +66,7 @@ void runStoppedServer(std::uint32_t domain) {
   });
   if (heard) {
     heard = inbox.on<Command>(session, wire::kCommand, [&](const Command& command) {
-      const bool is_named = command.raises == std::vector<RaiseRange>{{"Ben", 1, 1}, {"Ben", 3, 4}};
-      (void)acks->write({command.client, command.id, is_named, "not named", Refusal::kNone});
+      (void)acks->write({command.client, command.id, command.value == 7.0, "not named", Refusal::kNone});
     });
   }
   if (!heard) _exit(1);
@@ -105,14 +101,23 @@ TEST(CommandClient, WhatMayNotBeDoneTwiceIsNotRepeatedAndThePersonIsToldSo) {
   EXPECT_THAT(sent.error().what, ::testing::HasSubstr("may have obeyed or not"));
 }
 
-TEST(CommandClient, AClearNamesTheRaisesThatItsSenderHasHeard) {
+TEST(CommandClient, OfTheRaisesThatStandTheNewestIsTold) {
+  EXPECT_EQ(describe({.number = 7, .standing = 3, .who = "Ben", .reason = "caught\x1b[2J"}),
+            "emergency stop by Ben: caught [2J, the newest of 3 raises");
+  EXPECT_EQ(describe({.number = 7, .standing = 1, .who = "Ben"}), "emergency stop by Ben: ");
+}
+
+TEST(CommandClient, AClearNamesTheRaisesThatItsSenderHasHeardOf) {
   const std::uint32_t domain = test::ownDomain();
   const test::Peer server([domain] { runStoppedServer(domain); });
   const std::atomic<bool> stop = false;
   auto client = CommandClient::open({.domain = domain, .timeout = std::chrono::seconds(60)}, stop);
   ASSERT_TRUE(client) << client.error().what;
-  const auto sent = (*client)->send({.command = CommandKind::kClearEmergencyStop}, stop);
+  auto sent = (*client)->send({.command = CommandKind::kClearEmergencyStop}, stop);
   EXPECT_TRUE(sent) << sent.error().what;
+  EXPECT_EQ((*client)->toldRaise(), 7U);
+  sent = (*client)->send({.command = CommandKind::kClearEmergencyStop, .value = 6.0}, stop);
+  EXPECT_FALSE(sent) << "by one who was told of the sixth";
 }
 
 }  // namespace

@@ -58,11 +58,10 @@ TEST(FoxgloveProtocol, UnderstandsRequestsToTheDesk) {
   ASSERT_TRUE(command && command->desk) << command.error().what;
   EXPECT_EQ(command->desk->kind, DeskRequest::Kind::kCommand);
   EXPECT_THAT(command->desk->words, ElementsAre("note", "mind the edge"));
-  EXPECT_FALSE(command->desk->raises);
-  const auto clear = parseViewerText(
-      R"({"op":"deskCommand","id":4,"words":["clear"],"raises":[{"client_guid":"a","counter":2}]})");
+  EXPECT_FALSE(command->desk->newest_raise);
+  const auto clear = parseViewerText(R"({"op":"deskCommand","id":4,"words":["clear"],"newestRaise":2})");
   ASSERT_TRUE(clear && clear->desk) << clear.error().what;
-  EXPECT_EQ(clear->desk->raises, (std::vector<RaiseId>{{"a", 2}}));
+  EXPECT_EQ(clear->desk->newest_raise, 2U);
   const auto take = parseViewerText(R"({"op":"handTake","id":5,"role":"trainee","hands":["right","left"]})");
   ASSERT_TRUE(take && take->desk) << take.error().what;
   EXPECT_EQ(take->desk->kind, DeskRequest::Kind::kTakePart);
@@ -102,9 +101,6 @@ TEST(FoxgloveProtocol, SaysWhatIsWrongWithARequest) {
       {R"({"op":"deskCommand","id":1,"words":["a","b","c","d","e","f","g","h","i"]})",
        "without a list 'words'"},
       {R"({"op":"deskCommand","id":1,"words":[7]})", "no text"},
-      {R"({"op":"deskCommand","id":1,"words":["clear"],"raises":7})", "no list of at most 1024"},
-      {R"({"op":"deskCommand","id":1,"words":["clear"],"raises":[{"client_guid":"a"}]})",
-       "without a number 'counter'"},
       {R"({"op":"deskRule","id":1})", "'deskRule' is not offered"},
       {R"({"op":"handTake","id":1})", "without a list 'hands'"},
       {R"({"op":"handTake","id":1,"hands":["a","b","c"]})", "of 1 to 2 texts"},

@@ -74,32 +74,23 @@ TEST(StopTruth, InEveryOrderOfArrivalTheSameRaisesStand) {
   EXPECT_EQ(orders, 1956) << "sum over k of 6! / (6 - k)!, less the empty one";
 }
 
-TEST(StopTruth, RaisesAreNamedByAsFewRangesAsNameNoOther) {
-  EXPECT_TRUE(rangesOf({}).empty());
-  EXPECT_EQ(rangesOf({{"b", 7}, {"a", 4}, {"a", 1}, {"a", 2}, {"a", 2}, {"b", 8}}),
-            (std::vector<RaiseRange>{{"a", 1, 2}, {"a", 4, 4}, {"b", 7, 8}}));
-  std::vector<RaiseId> many;
-  for (std::uint32_t i = 0; i < 2 * kMostRanges; ++i) many.push_back({"a", 2 * i});
-  EXPECT_EQ(rangesOf(many).size(), kMostRanges);
-  EXPECT_FALSE((RaiseRange{"a", 1, 2}.contains({"b", 1})));
-}
-
-TEST(StopTruth, OfAClientThatRaisesWithoutEndTheNewestRaisesStandUntilAllThatStandAreCleared) {
+TEST(StopTruth, OfAClientThatRaisesWithoutEndABoundedNumberStandsUntilThoseAreCleared) {
   StopTruth truth;
   constexpr std::uint32_t kRaises = 1000;
   for (std::uint32_t counter = 1; counter <= kRaises; ++counter) {
     const StopChange change = truth.raise({"a", counter, "Ada", "hand caught"});
     ASSERT_TRUE(change);
-    ASSERT_EQ(change.superseded.has_value(), counter > StopTruth::kMostOfClient);
-    if (change.superseded) {
-      ASSERT_EQ(change.superseded->counter, counter - StopTruth::kMostOfClient);
+    ASSERT_EQ(truth.raised(), counter) << "who clears has to know of it";
+    ASSERT_EQ(change.superfluous.has_value(), counter > StopTruth::kMostOfClient);
+    if (change.superfluous) {
+      ASSERT_EQ(change.superfluous->counter, counter);
     }
-    ASSERT_TRUE(truth.standing().contains({"a", counter})) << "the newest one";
     ASSERT_LE(truth.standing().size(), StopTruth::kMostOfClient);
     ASSERT_LE(truth.cleared().size(), StopTruth::kMostOfClient);
   }
-  EXPECT_FALSE(truth.raise({"a", kRaises - StopTruth::kMostOfClient, "Ada", "late"})) << "superseded";
-  EXPECT_TRUE(truth.raise({"a", 1, "Ada", "late"})) << "its end is forgotten: it stands rather than not";
+  EXPECT_FALSE(truth.raise({"a", kRaises, "Ada", "late"})) << "repeated";
+  EXPECT_TRUE(truth.raise({"a", kRaises / 2, "Ada", "late"}).superfluous)
+      << "forgotten, beside those that stand";
   truth.raise({"b", 1, "Ben", "another client"});
   EXPECT_EQ(truth.standing().size(), StopTruth::kMostOfClient + 1);
   const auto standing = truth.standing();
@@ -108,6 +99,8 @@ TEST(StopTruth, OfAClientThatRaisesWithoutEndTheNewestRaisesStandUntilAllThatSta
     truth.clear({id.client_guid, id.counter, "Ben", "safe"});
   }
   EXPECT_FALSE(truth.engaged());
+  EXPECT_TRUE(truth.raise({"a", kRaises + 1, "Ada", "hand caught"}));
+  EXPECT_TRUE(truth.engaged());
 }
 
 TEST(StopTruth, OfRaisesUnderEverNewNamesABoundedNumberStands) {
@@ -115,7 +108,7 @@ TEST(StopTruth, OfRaisesUnderEverNewNamesABoundedNumberStands) {
   for (std::uint32_t client = 0; client < 3 * StopTruth::kMostInAll; ++client) {
     const std::string guid = std::to_string(client);
     ASSERT_TRUE(truth.raise({guid, 1, "Ada", "hand caught"}));
-    ASSERT_TRUE(truth.standing().contains({guid, 1})) << "the newest one";
+    ASSERT_EQ(truth.standing().contains({guid, 1}), client < StopTruth::kMostInAll);
   }
   EXPECT_EQ(truth.standing().size(), StopTruth::kMostInAll);
   EXPECT_EQ(truth.cleared().size(), StopTruth::kMostInAll);

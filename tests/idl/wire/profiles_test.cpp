@@ -73,6 +73,7 @@ const std::vector<Row> kRows{
     {"EmergencyStop", kStateOfSeveral, kStateOfSeveral, ", joiners 1, outlives its writer",
      ", joiners 1, outlives its writer"},
     {"EmergencyClear", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
+    {"NewestRaise", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"Command", kEvent, kEvent, ", lifespan 5000 ms", ""},
     {"CommandAck", kEvent, kEvent, ", lifespan 5000 ms", ""},
     {"EventLog", kLateEvent, kLateEvent, ", joiners 1000", ", joiners 1000"},

@@ -241,6 +241,21 @@ TEST(EventGenerator, AnEmergencyStopIsLoggedAsErrorAndItsEndIsLogged) {
   EXPECT_EQ(stop->severity, Severity::kError);
 }
 
+TEST(EventGenerator, APauseWithinAnEmergencyStopIsNotASecondStop) {
+  test::SessionRig rig;
+  EventGenerator generator(rig.loaded().scenario, kEpoch);
+  GeneratedEvents generated;
+  generated.add(generator.generate(rig.tick()));
+  rig.change({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
+  generated.add(generator.generate(rig.tick()));
+  rig.change({.kind = ChangeKind::kPause});
+  generated.add(generator.generate(rig.tick()));
+  EXPECT_EQ(generated.runs.back().phase, RunPhase::kPaused);
+  rig.change({.kind = ChangeKind::kSetEmergencyStop, .value = 0.0});
+  generated.add(generator.generate(rig.tick()));
+  EXPECT_THAT(generated.texts("run"), ElementsAre("running", "emergency stop", "paused"));
+}
+
 class FramePackerTest : public ::testing::Test {
  protected:
   explicit FramePackerTest(std::uint32_t objects = 30) {

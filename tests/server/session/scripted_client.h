@@ -52,6 +52,7 @@ class ScriptedClient {
     subscribe(session_, wire::kEmergencyStop, [this](const EmergencyStop& stop) { stops.raise(stop); });
     subscribe(session_, wire::kEmergencyClear,
               [this](const EmergencyClear& cleared) { stops.clear(cleared); });
+    subscribe(session_, wire::kNewestRaise, [this](const NewestRaise& newest) { newest_raise = newest; });
     subscribe(everything_, wire::kHandManifold, [this](const HandManifold& manifold) {
       if (manifold.hand == controlledHand()) newest = manifold, ++manifolds;
     });
@@ -87,7 +88,8 @@ class ScriptedClient {
     (void)joins_.write(join_);
     if (!receivesUntil([this] { return welcome.client_guid == guid_ && welcome.challenge.empty(); }))
       return false;
-    if (welcome.accepted) (void)presence_.write({welcome.client, guid, role, welcome.hands, true});
+    if (welcome.accepted && says_presence)
+      (void)presence_.write({welcome.client, guid, role, welcome.hands, true});
     return true;
   }
   /// Claims a seat by its public key, with a proof by another secret.
@@ -115,15 +117,10 @@ class ScriptedClient {
     (void)presence_.dispose({.client = welcome.client});
   }
   void command(CommandKind kind) { (void)commands_.write({welcome.client, ++commands_sent_, kind}); }
-  /// Of the raises that it has heard; an id is that of command().
-  void clearStop() {
-    std::vector<RaiseId> named;
-    for (const auto& [id, stop] : stops.standing()) named.push_back(id);
-    clearStop(named);
-  }
-  void clearStop(const std::vector<RaiseId>& named) {
+  /// As one who was told of raises up to this number; its id is counted with those of command().
+  void clearStop(std::uint32_t newest) {
     Command clear{welcome.client, ++commands_sent_, CommandKind::kClearEmergencyStop};
-    clear.raises = rangesOf(named);
+    clear.value = newest;
     (void)commands_.write(clear);
   }
 
@@ -142,6 +139,8 @@ class ScriptedClient {
   RunState run;
   std::vector<EventLog> events;
   StopTruth stops;
+  NewestRaise newest_raise;
+  bool says_presence = true;  ///< once it has a seat
   int answers_to_others = 0;  ///< to the client_guid "elsewhere"
 
  private:

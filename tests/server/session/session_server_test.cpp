@@ -285,24 +285,35 @@ TEST(SessionServer, AnyClientEngagesAnEmergencyStopAndOnlyTheInstructorClearsIt)
   EXPECT_TRUE(
       trainee.receivesUntil([&] { return trainee.received("emergency stop", "engaged by trainee"); }));
 
-  trainee.clearStop();
+  trainee.clearStop(2);
   ASSERT_TRUE(trainee.receivesUntil([&] { return trainee.ack.id == 1; }));
   EXPECT_FALSE(trainee.ack.accepted);
-  admin.clearStop();
+  admin.clearStop(2);
   ASSERT_TRUE(admin.receivesUntil([&] { return admin.ack.id == 1; }));
   EXPECT_THAT(admin.ack.reason, HasSubstr("an instructor is present"));
 
-  instructor.clearStop({{"trainee", 1}, {"trainee", 2}});
+  instructor.clearStop(2);
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 1; }));
   EXPECT_TRUE(instructor.ack.accepted) << instructor.ack.reason;
   EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.cleared().size() == 2; }));
   EXPECT_FALSE(trainee.stops.engaged());
-  instructor.clearStop({});
+  instructor.clearStop(2);
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 2; }));
   EXPECT_EQ(instructor.ack.reason, "there is no emergency stop");
 
   trainee.emergencyStop();
   EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.engaged(); })) << "a new raise is not cleared";
+}
+
+TEST(SessionServer, WhoEndsBeforeTheirPresenceIsHeardLeavesTheSeat) {
+  RunningServer server({.name = "silent", .wait_for = {"right"}});
+  test::ScriptedClient silent("silent", wire::LinkProfile::kLan);
+  silent.says_presence = false;
+  ASSERT_TRUE(silent.join("silent", Role::kTrainee, {"right"}));
+  EXPECT_TRUE(silent.receivesUntil([&] { return silent.received("leave", "silent (trainee) has left"); }));
+  test::ScriptedClient next("silent", wire::LinkProfile::kLan);
+  ASSERT_TRUE(next.join("next", Role::kTrainee, {"right"}));
+  EXPECT_TRUE(next.welcome.accepted) << next.welcome.reason;
 }
 
 TEST(SessionServer, ARaiseThatWhoClearsHasNotSeenStands) {
@@ -312,21 +323,23 @@ TEST(SessionServer, ARaiseThatWhoClearsHasNotSeenStands) {
   ASSERT_TRUE(trainee.join("trainee", Role::kTrainee, {"right"}));
   ASSERT_TRUE(instructor.join("instructor", Role::kInstructor, {}));
   trainee.emergencyStop();
+  ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.newest_raise.number == 1; }));
+  EXPECT_EQ(instructor.newest_raise.reason, "a test");
   trainee.emergencyStop();
-  ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.received("emergency stop", "engaged by"); }));
-  ASSERT_TRUE(trainee.receivesUntil([&] { return trainee.stops.standing().size() == 2; }));
+  ASSERT_TRUE(trainee.receivesUntil([&] { return trainee.newest_raise.number == 2; }));
 
-  instructor.clearStop({{"trainee", 1}});
+  instructor.clearStop(1);
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 1; }));
   EXPECT_EQ(instructor.ack.refusal, Refusal::kRaisedAgain);
-  EXPECT_THAT(instructor.ack.reason, HasSubstr("raised again, by trainee: a test"));
-  EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.cleared().size() == 1; }));
-  EXPECT_TRUE(trainee.stops.engaged());
+  EXPECT_THAT(instructor.ack.reason,
+              HasSubstr("a newer raise stands than those you were told of, by trainee"));
+  EXPECT_TRUE(trainee.stops.cleared().empty());
 
-  instructor.clearStop({{"trainee", 2}});
+  instructor.clearStop(2);
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 2; }));
   EXPECT_TRUE(instructor.ack.accepted) << instructor.ack.reason;
   EXPECT_TRUE(trainee.receivesUntil([&] { return !trainee.stops.engaged(); }));
+  EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.newest_raise.standing == 0; }));
 }
 
 // in lockstep no tick comes between the two
@@ -361,7 +374,7 @@ TEST(SessionServer, WithoutAnInstructorAnAdminClearsTheEmergencyStopAndTheRunSta
   runInLockstep(trainee, 4, 6);
   EXPECT_TRUE(trainee.newest.frozen);
   ASSERT_TRUE(admin.receivesUntil([&] { return admin.stops.engaged(); }));
-  admin.clearStop();
+  admin.clearStop(1);
   ASSERT_TRUE(admin.receivesUntil([&] { return admin.ack.id == 1; }));
   EXPECT_TRUE(admin.ack.accepted) << admin.ack.reason;
   runInLockstep(trainee, 7, 9);
@@ -395,7 +408,7 @@ TEST(SessionServer, AnEmergencyStopStandsAfterARestartUntilItIsCleared) {
     ASSERT_TRUE(late.join("late", Role::kInstructor, {}));
     ASSERT_TRUE(late.receivesUntil([&] { return late.stops.engaged(); }));
     EXPECT_EQ(late.stops.standing().begin()->first.client_guid, raised.client_guid);
-    late.clearStop();
+    late.clearStop(1);
     ASSERT_TRUE(late.receivesUntil([&] { return late.ack.id == 1; }));
     EXPECT_TRUE(late.ack.accepted) << late.ack.reason;
   }

@@ -11,7 +11,6 @@ import { hasText, language, retold, SPEAKERS, t, type Key } from "./strings";
 
 const NOTICE = 8000; // [ms] that an answer is shown
 const NOTICES = 3;
-const RAISES = 256; // of the emergency stop that a clear names
 const OTHER_LABELS: Record<string, Key> = { note: "desk.note.said", clear: "stop.clear", collision: "desk.collision", kick: "desk.kick", give: "desk.give", guide: "guide" };
 export const PASS = "pass"; // in the address, and in this tab's memory
 
@@ -192,7 +191,7 @@ export class Desk {
   /** Called when the session has changed. */
   show(): void {
     const { session } = this;
-    const isRaised = session.standing.length > 0;
+    const isRaised = session.isRaised;
     const words: Key = isRaised ? "stop.again" : this.isOfAll ? "stop.all" : "stop.press";
     this.clear.hidden = !isRaised || this.role === "" || this.permitted["clear"] === undefined;
     if (this.stop.dataset["words"] !== t(words)) {
@@ -355,8 +354,7 @@ export class Desk {
       this.notify(false, `${t(label)}: ${t(why)}`);
       return false;
     }
-    const seen = this.session.standing.slice(0, RAISES).map(({ client_guid, counter }) => ({ client_guid, counter }));
-    const answer = await this.source.ask("deskCommand", words[0] === "clear" ? { words, raises: seen } : { words });
+    const answer = await this.source.ask("deskCommand", words[0] === "clear" ? { words, newestRaise: this.session.newestRaise?.number } : { words });
     this.tell(t(label), answer);
     if (answer?.code === "not_joined" && this.role !== "") {
       this.role = "";
@@ -415,8 +413,7 @@ export function reasonOfLoss(text: string): string {
 export function reasonOf(answer: DeskAnswer): string {
   const key = `refusal.${answer.code}` as Key;
   if (answer.accepted || answer.code === undefined || !hasText(key)) return answer.text;
-  if (answer.code === "other" && language !== "en") return `${t(key)}: ${answer.text}`;
-  return language === "en" && answer.text !== "" ? answer.text : t(key);
+  return language === "en" && answer.text !== "" ? answer.text : t(key, { reason: answer.text }).replace(/: *$/, "");
 }
 
 /** The hands that somebody moves, each with its device, and the age of their contacts [ms]. */

@@ -1,7 +1,7 @@
 // What is known of a session, from its messages alone.
 import {
   NONE, RunPhase, StepPhase, type ConsoleState, type ContactPairs, type EmergencyStop, type EventLog, type GrabState, type HandState,
-  type ObjectSnapshot, type ObjectState, type PairContact, type Presence, type RecorderStatus, type RunState, type SceneHand, type SceneObject,
+  type NewestRaise, type ObjectSnapshot, type ObjectState, type PairContact, type Presence, type RecorderStatus, type RunState, type SceneHand, type SceneObject,
   type SceneStep, type StepProgress, type StepState, type Telemetry, type TickStats, type WorldFrame,
 } from "./messages";
 import { deviceOf, type Device } from "./eventtext";
@@ -10,7 +10,7 @@ import { Tracks } from "./tracks";
 
 export const TOPICS = [
   "/console", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepState", "StepProgress",
-  "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "ClientEvent", "Telemetry", "RecorderStatus", "__instance_state",
+  "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "NewestRaise", "EventLog", "ClientEvent", "Telemetry", "RecorderStatus", "__instance_state",
 ] as const;
 
 const EVENTS = 200;
@@ -43,6 +43,7 @@ export class Session {
   telemetry = new Map<number, Telemetry>(); // by client
   devices = new Map<string, Device>(); // by the name of the hand
   recorder?: RecorderStatus;
+  newestRaise?: NewestRaise;
   events: EventLog[] = [];
   tick = 0;
   /** Increased when poses, and when anything else has changed. */
@@ -136,6 +137,9 @@ export class Session {
         this.clears.add(`${clear.client_guid}/${clear.counter}`);
         break;
       }
+      case "NewestRaise":
+        this.newestRaise = message as NewestRaise;
+        break;
       case "EventLog":
         this.log(message as EventLog);
         break;
@@ -247,7 +251,12 @@ export class Session {
 
   /** A raise stands, and the server has said of the run that it is stopped: others may have heard of a raise, and it not. */
   get isStopped(): boolean {
-    return this.standing.length > 0 && this.run?.emergency_stop === true;
+    return this.isRaised && this.run?.emergency_stop === true;
+  }
+
+  /** By what was heard of the raises themselves, or of the server. */
+  get isRaised(): boolean {
+    return this.standing.length > 0 || (this.newestRaise?.standing ?? 0) > 0;
   }
 
   /** It is open, and has not begun: of no object it is said where it is, only where it is to begin. */
