@@ -335,8 +335,11 @@ TEST(SessionServer, ARaiseThatWhoClearsHasNotSeenStands) {
               HasSubstr("a newer raise stands than those you were told of, by trainee"));
   EXPECT_TRUE(trainee.stops.cleared().empty());
 
-  instructor.clearStop(2);
+  instructor.clearStop(9);
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 2; }));
+  EXPECT_EQ(instructor.ack.refusal, Refusal::kRaisedAgain) << "of another life of the server";
+  instructor.clearStop(2);
+  ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 3; }));
   EXPECT_TRUE(instructor.ack.accepted) << instructor.ack.reason;
   EXPECT_TRUE(trainee.receivesUntil([&] { return !trainee.stops.engaged(); }));
   EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.newest_raise.standing == 0; }));
