@@ -64,6 +64,8 @@ Result<DeskRequest> parseDesk(const nlohmann::json& json, std::string_view op) {
     if (!words) return fail(words.error().what);
     request.words = std::move(*words);
     request.newest_raise = number(json, "newestRaise");
+    if (!request.newest_raise && json.contains("newestRaise"))
+      return fail("a 'newestRaise' that is no number of a raise");
   }
   if (request.kind == Kind::kTakePart) {
     auto hands = texts(json, "hands", kMostHands);

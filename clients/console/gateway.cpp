@@ -99,7 +99,7 @@ class Gateway {
   BrowserHands hands_;
 };
 
-/// Before it is served: 20 s for 1 GB.
+/// Before it is served: some seconds for 100 MB.
 Result<void> Gateway::checkRecording() {
   auto told = std::chrono::steady_clock::now();
   const auto playable = record::checkPlayable(options_.recording, stop_, [&](double fraction) {

@@ -101,6 +101,7 @@ TEST(FoxgloveProtocol, SaysWhatIsWrongWithARequest) {
       {R"({"op":"deskCommand","id":1,"words":["a","b","c","d","e","f","g","h","i"]})",
        "without a list 'words'"},
       {R"({"op":"deskCommand","id":1,"words":[7]})", "no text"},
+      {R"({"op":"deskCommand","id":1,"words":["clear"],"newestRaise":-1})", "no number of a raise"},
       {R"({"op":"deskRule","id":1})", "'deskRule' is not offered"},
       {R"({"op":"handTake","id":1})", "without a list 'hands'"},
       {R"({"op":"handTake","id":1,"hands":["a","b","c"]})", "of 1 to 2 texts"},
