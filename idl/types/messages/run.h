@@ -67,8 +67,8 @@ struct EmergencyClear {
   std::string reason;
 };
 
-/// The newest raise that has come to stand at the server. A clear names all raises up to its number, so those
-/// that its sender has not been told of stand.
+/// The newest raise that the server knows of. A clear names its number, and is refused with any other one: so
+/// it lifts no raise that its sender has not been told of.
 struct NewestRaise {
   std::uint32_t number = 0;    ///< counts from 1 in this life of the server; 0: there was none
   std::uint32_t standing = 0;  ///< raises that stand

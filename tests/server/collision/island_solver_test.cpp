@@ -369,7 +369,7 @@ TEST(IslandSolver, WhatExceedsTheWorkLimitIsLeftToTheNextTick) {
     EXPECT_TRUE(report.unconverged);
     EXPECT_LT(report.steps, at_once.steps);
     const double x = limited.pose(0).translation().x();
-    EXPECT_GT(x, before) << "in each tick it goes on";
+    EXPECT_GT(x, before) << "it moves in each tick";
     EXPECT_LE(x, before + 2.0 * limited.limits.max_step_length) << "one step, or two";
     EXPECT_GT(limited.smallest_gap, -5e-6) << "and never into the ground";
     before = x;

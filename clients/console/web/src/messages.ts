@@ -48,7 +48,7 @@ export interface GrabState { object_id: number; hand_id: number; epoch: number; 
 export interface Presence { client_id: number; name: string; role: number; hands: ArrayLike<number>; alive: boolean }
 export interface EmergencyStop { client_guid: string; counter: number; who: string; reason: string }
 export interface EmergencyClear { client_guid: string; counter: number; who: string; reason: string }
-/** A clear names all raises up to this number. */
+/** A clear names this number, and is refused when a newer raise stands. */
 export interface NewestRaise { number: number; standing: number; who: string; reason: string }
 export interface RecorderStatus { file: string; recording: boolean; messages: bigint; lost: bigint; problem: string }
 export interface Telemetry { client_id: number; input_to_force_p50: number; input_to_force_p99: number; loop_overruns: bigint; samples: bigint; age: number; jitter: number; answers_lost: number; inputs_lost: number; inputs_replaced: number; clock_known: boolean; clock_offset: number; clock_error: number; round_trip: number }
