@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 
 import browser
+import opened
 from child import die_with_the_script
 from demo_scene import hands_of, shipped_as
 from number_option import between
@@ -168,10 +169,10 @@ def say_new_lines(program):
         say(line)
 
 
-def is_open(server):
+def has_opened(server):
     """Whether the session is open; says what the server says while it prepares the scene."""
     for line in server.new_lines():
-        if "is open" in line:
+        if opened.is_open(line):
             return True
         say(line)
     return False
@@ -278,11 +279,11 @@ def run_session(args, out, programs):
         scenario = without_timeouts(scenario, out)
     server = programs.start("serve", scenario, "--detail", args.detail, "--workers", args.workers, "--journal", out / "journal.mcap",
                             "--wait-for", ",".join(awaited + (["instructor"] if has_instructor else [])))
-    opened = False
-    while not opened and server.is_running():
-        opened = is_open(server)
+    is_open = False
+    while not is_open and server.is_running():
+        is_open = has_opened(server)
         time.sleep(0.05)
-    if not opened:
+    if not is_open:
         say("the server did not start:\n" + "\n".join(server.lines()[-20:]))
         return 1
 

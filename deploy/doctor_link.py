@@ -6,6 +6,7 @@ Stamps of received datagrams are the kernel's (SO_TIMESTAMPNS, CLOCK_REALTIME), 
 """
 import errno
 import json
+import math
 import os
 import selectors
 import signal
@@ -23,6 +24,9 @@ HEADERS = 28        # [bytes] IPv4 and UDP
 SO_TIMESTAMPNS = 35
 IP_MTU, IP_MTU_DISCOVER, IP_PMTUDISC_DO = 14, 10, 2
 ECHO, HELLO, SEND_BACK, BACK = b"e", b"h", b"s", b"b"
+MOST_LOSS = 0.2     # [-] each way: up to that much a port that passes is not called blocked
+RARE = 1e-6         # [-] how often one is, then
+BETWEEN_BACKS = 0.5  # [s] the listener sends back so often at most
 
 
 def ports_of(domain):
@@ -71,6 +75,11 @@ def timer_lateness(seconds=0.5):
 def percentile(values, percent):
     ordered = sorted(values)
     return ordered[min(len(ordered) - 1, int(len(ordered) * percent / 100))]
+
+
+def tries_for(heard, ports=1):
+    """How often to try `ports` that pass a try with the probability `heard`, until all are heard but for RARE."""
+    return math.ceil(math.log(RARE / ports) / math.log(1.0 - heard))
 
 
 # ---- the side that answers
@@ -126,7 +135,7 @@ def answer(received, by_group, sock, unseen, ports, lateness, sent_back):
         elif kind == HELLO:
             told = {"ports": ports, "late": lateness, "from": sender[0], "multicast": by_group}
             sock.sendto(MAGIC + HELLO + json.dumps(told).encode(), sender)
-        elif kind == SEND_BACK and time.monotonic() - sent_back.get(sender[0], -1.0) > 0.5:
+        elif kind == SEND_BACK and time.monotonic() - sent_back.get(sender[0], -1.0) > BETWEEN_BACKS:
             sent_back[sender[0]] = time.monotonic()
             for port in json.loads(data[len(MAGIC) + 1:])[:PORTS]:
                 unseen.sendto(MAGIC + BACK, (sender[0], int(port)))
@@ -163,23 +172,46 @@ class Link:
             self.own = route.getsockname()[0]
         self.sock = bound(self.own, 0)
 
-    def ask(self, message, ports, seconds=1.0, expected=1):
-        """Sends to each port, twice, and collects what comes: (data, stamp, port)."""
-        found = []
-        for repetition in range(2):
-            for port in ports:
-                try:
-                    self.sock.sendto(MAGIC + message, (self.address, port))
-                except OSError:
-                    pass
-            end = time.monotonic() + seconds / 2
-            while time.monotonic() < end and len(found) < expected:
+    def send(self, message, port):
+        try:
+            self.sock.sendto(MAGIC + message, (self.address, port))
+        except OSError:
+            pass
+
+    def greet(self):
+        """What each port answers to a greeting, by port, and how many tries that took. Ports that are not heard are tried again, after waits
+        that grow, so that loss is not taken for a firewall. The listener's answer names the ports that it has."""
+        heard, wanted = {}, set(ports_of(self.domain))
+        tries = tries_for((1.0 - MOST_LOSS) ** 2, PORTS)
+        for number in range(tries):
+            for port in sorted(wanted - set(heard)):
+                self.send(HELLO, port)
+            end = time.monotonic() + (min(0.4, 0.1 * 1.5 ** number) if number + 1 < tries else 1.0)
+            while time.monotonic() < end and wanted - set(heard):
                 received = receive(self.sock)
                 if received is None:
                     time.sleep(1e-3)
-                elif received[0].startswith(MAGIC):
-                    found.append((received[0][len(MAGIC):], received[1], received[2][1]))
-        return found
+                elif received[0].startswith(MAGIC + HELLO):
+                    heard.setdefault(received[2][1], json.loads(received[0][len(MAGIC) + 1:]))
+                    wanted = set(next(iter(heard.values()))["ports"])
+            if not wanted - set(heard):
+                return heard, number + 1
+        return heard, tries
+
+    def call_back(self, port, sockets):
+        """Has the listener send to `sockets`, by port; returns the ports that hear nothing, and how many tries that took."""
+        deaf = set(sockets)
+        tries = tries_for((1.0 - MOST_LOSS ** 2) * (1.0 - MOST_LOSS), PORTS)
+        for number in range(tries):
+            for _ in range(2):  # the listener obeys the first that arrives
+                self.send(SEND_BACK + json.dumps(sorted(deaf)).encode(), port)
+            end = time.monotonic() + BETWEEN_BACKS + 0.05 * (number + 1)
+            while time.monotonic() < end and deaf:
+                deaf -= {one for one in deaf if receive(sockets[one]) is not None}
+                time.sleep(1e-3)
+            if not deaf:
+                return deaf, number + 1
+        return deaf, tries
 
 
 def echoes(link, port, seconds, size=SAMPLE, rate=200):
@@ -204,7 +236,7 @@ def echoes(link, port, seconds, size=SAMPLE, rate=200):
             data, stamp, _ = received
             if data.startswith(MAGIC + ECHO) and len(data) >= 48:
                 number, t0, t1, t2 = struct.unpack("qqqq", data[16:48])
-                found[number] = ((stamp - t0 - (t2 - t1)) * 1e-9, ((t1 - t0) + (t2 - stamp)) * 0.5e-9)
+                found.setdefault(number, ((stamp - t0 - (t2 - t1)) * 1e-9, ((t1 - t0) + (t2 - stamp)) * 0.5e-9))
         time.sleep(2e-4)
     return sent, sorted(found.values())
 
@@ -227,24 +259,23 @@ def own_floor():
 
 def check_ports(link, state):
     ports = ports_of(link.domain)
-    answers = [json.loads(data[1:]) | {"port": port} for data, _, port in link.ask(HELLO, ports, 2.0, PORTS) if data[:1] == HELLO]
+    answers, tries = link.greet()
     span = f"UDP {ports[0]} to {ports[-1]}"
     if not answers:
-        return "bad", f"nothing answers at {link.host} ({link.address}), {span}", \
+        return "bad", f"nothing answers at {link.host} ({link.address}), {span}, {tries} times", \
             f"run `tenon doctor --listen` there, permit {span} in its firewall, and see whether there is a route: ip route get {link.address}"
-    state.update(answers[0])
-    heard = {answer["port"] for answer in answers}
-    silent = [port for port in state["ports"] if port not in heard]
+    port, told = next(iter(answers.items()))
+    state.update(told, port=port)
+    silent = [port for port in state["ports"] if port not in answers]
     mine = {port: sock for port in ports if (sock := bound(link.own, port))}
-    link.ask(SEND_BACK + json.dumps(list(mine)).encode(), [state["port"]], 1.0, PORTS + 1)
-    deaf = [port for port, sock in mine.items() if receive(sock) is None]
+    deaf, tries_back = link.call_back(state["port"], mine)
     for sock in mine.values():
         sock.close()
     if silent or deaf:
-        where = ([f"{link.host} does not hear {len(silent)} of {len(state['ports'])} ports"] if silent else []) + \
-            ([f"this machine does not hear {len(deaf)} of {len(mine)} ports"] if deaf else [])
+        where = ([f"{link.host} does not hear {len(silent)} of {len(state['ports'])} ports, {tries} times"] if silent else []) + \
+            ([f"this machine does not hear {len(deaf)} of {len(mine)} ports, {tries_back} times"] if deaf else [])
         return "bad", "; ".join(where), f"permit {span} there, from the other machine, in both directions (nftables: udp dport {ports[0]}-{ports[-1]} accept)"
-    return "good", f"{span} pass both ways ({len(heard)} there and {len(mine)} here were free to try)", ""
+    return "good", f"{span} pass both ways ({len(answers)} there and {len(mine)} here were free to try)", ""
 
 
 def check_address(link, state):
@@ -260,7 +291,7 @@ def check_size(link, state):
     sock.connect((link.address, state["port"]))
     largest = 0
     for size in (512, 1200, 1280, WHOLE, 1392, 1472):
-        for _ in range(6):
+        for _ in range(tries_for((1.0 - MOST_LOSS) ** 2) if size <= WHOLE else 6):
             packet = bytearray(size)
             packet[:len(MAGIC) + 1] = MAGIC + ECHO
             try:
@@ -275,6 +306,8 @@ def check_size(link, state):
                 time.sleep(1e-3)
             if largest == size:
                 break
+        if largest < size:
+            break
     mtu = sock.getsockopt(socket.IPPROTO_IP, IP_MTU)
     sock.close()
     if largest >= WHOLE:
@@ -295,7 +328,7 @@ def check_delay(link, state):
     text = (f"{(longest + shortest) / 2 * 1e3:.2f} ms one way, +-{(longest - shortest) / 2 * 1e3:.2f} ms if both directions are alike "
             f"(half of the shortest of {len(trips)} round trips; median {percentile(trips, 50) * 5e2:.2f} ms)")
     if longest > 0.15:
-        return "bad", text, "above 150 ms a session is for watching alone: take a server that is nearer"
+        return "bad", text, "above 150 ms contacts are not felt, guidance alone: take a server that is nearer"
     if longest > 0.025:
         return "note", text, "above 25 ms people notice the delay at the hand; use --network wan"
     return "good", text, ""
@@ -318,7 +351,8 @@ def check_loss(link, state):
     text = f"{lost} of {state['sent']} round trips lost ({100 * share:.1f} %)"
     if share <= 0.001:
         return "good", text, ""
-    if share <= 0.04:
+    # 2 % each way, and what may be counted of it in so few
+    if lost <= 0.04 * state["sent"] + 3.0 * math.sqrt(0.04 * state["sent"]):
         return "note", text, "a session runs with it; on a cable in a lab it means a bad cable, switch or full link"
     return "bad", text, "more than 2 % each way: use a cable, or another route"
 
@@ -335,7 +369,7 @@ def check_multicast(link, state):
     sock = bound(link.own, 0)
     sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(link.own))
     heard = False
-    for _ in range(5):
+    for _ in range(tries_for((1.0 - MOST_LOSS) ** 2)):
         try:
             sock.sendto(MAGIC + HELLO, (GROUP, 7400 + 250 * link.domain))
         except OSError:

@@ -10,7 +10,7 @@ install(PROGRAMS tenon DESTINATION bin COMPONENT tenon)
 # ---- what they read; parts of scenarios are made on the machine, by tenon-parts
 install(DIRECTORY scenarios DESTINATION share/tenon COMPONENT tenon
         PATTERN part_generator EXCLUDE PATTERN *.png EXCLUDE)
-install(FILES deploy/browser.py deploy/child.py deploy/demo.py deploy/demo_scene.py deploy/doctor.py deploy/doctor_link.py deploy/interrupt.py deploy/number_option.py deploy/picture.py DESTINATION share/tenon/deploy COMPONENT tenon)
+install(FILES deploy/browser.py deploy/child.py deploy/demo.py deploy/demo_scene.py deploy/doctor.py deploy/doctor_link.py deploy/interrupt.py deploy/number_option.py deploy/opened.py deploy/picture.py DESTINATION share/tenon/deploy COMPONENT tenon)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/console_page ${CMAKE_BINARY_DIR}/report_page DESTINATION share/tenon COMPONENT tenon OPTIONAL PATTERN built EXCLUDE)
 install(PROGRAMS clients/remote_hand/remote_hand.py DESTINATION share/tenon/clients/remote_hand COMPONENT tenon)
 install(DIRECTORY deploy/dds DESTINATION share/tenon/deploy COMPONENT tenon)

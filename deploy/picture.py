@@ -15,6 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import browser
+import opened
 from child import die_with_the_script
 from number_option import between
 
@@ -43,7 +44,7 @@ def arguments():
                     "Exit code: 0 when the picture is there, 1 when it cannot be made, 2 for wrong usage.")
     parser.add_argument("what", metavar="SCENARIO|FILE.mcap", help="a shipped scenario's name, a scenario's folder, or a recording")
     parser.add_argument("-o", "--output", metavar="FILE.png", type=Path, help="default: its name, in this folder")
-    parser.add_argument("--at", type=moment, default="start", help="of a recording: start, end, or seconds since its beginning (default: %(default)s)")
+    parser.add_argument("--at", type=moment, default="start", help="of a recording: start, end, or seconds of the session (default: %(default)s)")
     parser.add_argument("--near", action="store_true", help="show the step's part and where it goes, not all of the scene")
     parser.add_argument("--size", type=size, default=(1600, 1000), metavar="WxH", help="in pixels (default: 1600x1000)")
     parser.add_argument("--dark", action="store_true", help="dark as the console's dark page")
@@ -118,7 +119,7 @@ def of_scenario(args):
     session = ("--session", f"picture-{os.getpid()}", "--domain", 100 + os.getpid() % 100)
     server = (Path(args.programs) / "tenon-serve", scenario if scenario.exists() else args.what, "--detail", args.detail, "--wait-for", "observer", *session)
     with Child(*server) as serve:
-        serve.wait_for("is open", LOADING)
+        serve.wait_for(opened.LINE, LOADING)
         with Child(Path(args.programs) / "tenon-console", session[1], "--domain", session[3], "--port", 0) as console:
             return drawn(args, console.wait_for(r"http://\S+", 60)[0])
 

@@ -1,6 +1,7 @@
 #include "devices/catalog.h"
 
 #include <array>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "devices/simulated/sigma7.h"
 #include "devices/simulated/simulated_device.h"
 #include "devices/simulated/vibrotac.h"
+#include "idl/threads/clock.h"
 
 namespace tenon::devices {
 namespace {
@@ -21,24 +23,33 @@ using OpenedDevice = Result<std::unique_ptr<HapticDevice>>;
 using OpenedBimanual = Result<std::unique_ptr<BimanualDevice>>;
 using OpenedTracker = Result<std::unique_ptr<Tracker>>;
 
+std::string serialOf(const DeviceConfiguration& configuration) {
+  return configuration.serial.empty() ? simulatedSerials().front() : configuration.serial;
+}
+
+void configure(SimulatedDevice& device, const DeviceConfiguration& configuration) {
+  device.setSerial(serialOf(configuration));
+  if (configuration.dead_man) device.addDeadManSwitch();
+  if (configuration.paces) device.addClock(std::make_shared<threads::SteadyClock>(), configuration.seed);
+}
+
 template <SimulatedModel (*kModel)()>
 OpenedDevice openSimulated(const DeviceConfiguration& configuration) {
-  auto device = std::make_unique<SimulatedDevice>(kModel(), configuration.seed);
-  if (configuration.dead_man) device->addDeadManSwitch();
+  auto device =
+      std::make_unique<SimulatedDevice>(kModel(), unitSeed(configuration.seed, configuration.serial));
+  configure(*device, configuration);
   if (auto opened = device->open(); !opened) return fail(opened.error().what);
   return device;
 }
 
-OpenedDevice openVibrotac(const DeviceConfiguration& /*configuration*/) {
-  return std::make_unique<Vibrotac>();
+OpenedDevice openVibrotac(const DeviceConfiguration& configuration) {
+  return std::make_unique<Vibrotac>(serialOf(configuration));
 }
 
 OpenedBimanual openHug(const DeviceConfiguration& configuration) {
-  auto hug = std::make_unique<Hug>(configuration.seed);
-  if (configuration.dead_man) {
-    hug->right().addDeadManSwitch();
-    hug->left().addDeadManSwitch();
-  }
+  auto hug = std::make_unique<Hug>(unitSeed(configuration.seed, configuration.serial));
+  configure(hug->right(), configuration);
+  configure(hug->left(), configuration);
   if (auto opened = hug->open(); !opened) return fail(opened.error().what);
   return hug;
 }
@@ -57,19 +68,19 @@ template <typename Opened>
 struct CatalogEntry {
   std::string_view name;
   Opened (*open)(const DeviceConfiguration& configuration);
-  CatalogFacts facts{};
+  CatalogFacts facts{.serials = simulatedSerials};
 };
 
 constexpr std::array kDevices{
     CatalogEntry<OpenedDevice>{kInstructorDevice, openSimulated<sigma7Model>},
     CatalogEntry<OpenedDevice>{"omega3-sim", openSimulated<omega3Model>},
     CatalogEntry<OpenedDevice>{"falcon-sim", openSimulated<falconModel>},
-    CatalogEntry<OpenedDevice>{kBracelet, openVibrotac, {.arms = 0}},
+    CatalogEntry<OpenedDevice>{kBracelet, openVibrotac, {.arms = 0, .serials = simulatedSerials}},
     CatalogEntry<OpenedDevice>{kRemoteHand, openRemote, {.simulated = false}},
 };
 
 constexpr std::array kBimanualDevices{
-    CatalogEntry<OpenedBimanual>{kTraineeDevice, openHug, {.arms = 2}},
+    CatalogEntry<OpenedBimanual>{kTraineeDevice, openHug, {.arms = 2, .serials = simulatedSerials}},
 };
 
 constexpr std::array kTrackers{
@@ -102,6 +113,19 @@ std::string unknown(std::string_view name) {
          "; bimanual: " + listOf(kBimanualDevices);
 }
 
+Result<void> checkSerial(const CatalogFacts& facts, std::string_view name, const std::string& serial) {
+  if (serial.empty()) return {};
+  const std::string device = "device '" + std::string(name) + "'";
+  if (facts.serials == nullptr) return fail(device + ": has no serial number, so none can be asked for");
+  std::string there;
+  for (const std::string& known : facts.serials()) {
+    if (known == serial) return {};
+    there += (there.empty() ? "" : ", ") + known;
+  }
+  return fail(device + ": none with serial number '" + serial +
+              "' is there; there are: " + (there.empty() ? "none" : there));
+}
+
 bool isTurned(const DeviceConfiguration& configuration) {
   return !configuration.q_DM.isApprox(Quaternion::Identity());
 }
@@ -126,6 +150,8 @@ OpenedDevice openDevice(std::string_view name, const DeviceConfiguration& config
         "device '" + std::string(name) +
         "' is bimanual and needs a station with two hands; devices for one hand: " + listOf(kDevices));
   if (entry == nullptr) return fail(unknown(name));
+  if (auto there = checkSerial(entry->facts, name, configuration.serial); !there)
+    return fail(there.error().what);
   auto device = entry->open(configuration);
   if (!device || !isTurned(configuration)) return device;
   return std::make_unique<MountedDevice>(std::move(*device), configuration.q_DM);
@@ -135,6 +161,8 @@ OpenedBimanual openBimanualDevice(std::string_view name, const DeviceConfigurati
   const auto* const entry = findIn(kBimanualDevices, name);
   if (entry == nullptr)
     return fail("unknown bimanual device '" + std::string(name) + "'; known: " + listOf(kBimanualDevices));
+  if (auto there = checkSerial(entry->facts, name, configuration.serial); !there)
+    return fail(there.error().what);
   auto device = entry->open(configuration);
   if (!device || !isTurned(configuration)) return device;
   return std::make_unique<MountedBimanualDevice>(std::move(*device), configuration.q_DM);

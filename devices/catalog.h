@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -18,7 +19,7 @@ inline constexpr std::string_view kRemoteHand = "remote";
 inline constexpr std::string_view kBodyTracker = "body-sim";
 
 /// Opens a device of the catalog by name; a new device is one line in catalog.cpp. An unknown name fails with
-/// a message that lists the known ones.
+/// a message that lists the known ones, and a serial number that is not there with those that are.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] Result<std::unique_ptr<HapticDevice>> openDevice(std::string_view name,
@@ -34,6 +35,8 @@ inline constexpr std::string_view kBodyTracker = "body-sim";
 struct CatalogFacts {
   unsigned arms = 1;      ///< hands that it moves: 2 of a bimanual one, 0 of one without axes
   bool simulated = true;  ///< with a simulated arm, or without a person
+  /// Serial numbers of those that are there; null: such a device has none.
+  std::vector<std::string> (*serials)() = nullptr;
 };
 /// Fails as openDevice does. Threads: any. Real-time: no.
 [[nodiscard]] Result<CatalogFacts> findDevice(std::string_view name);

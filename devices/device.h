@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -15,10 +16,12 @@ namespace tenon::devices {
 struct DeviceConfiguration {
   std::uint64_t seed = 1;  ///< varies the parameters of a simulated device
   std::string address;     ///< where it is: a port, host or socket; empty: the first one found
+  std::string serial;      ///< serial number of the one to open; empty: the first one found
   /// How it is mounted: from its own frame M to the frame D that stations see. A turn about any axis; its
   /// place does not matter, since the workspace moves.
   Quaternion q_DM = Quaternion::Identity();
   bool dead_man = false;  ///< a simulated device has a dead man's switch, which who holds it presses
+  bool paces = false;     ///< a simulated device has a clock of its own, which paces the loop
 };
 
 inline constexpr double kMaxMotorCounts =
@@ -29,6 +32,7 @@ inline constexpr double kMaxMotorCounts =
 /// means that the device lacks the feature.
 struct DeviceCaps {
   std::string model;
+  std::string serial;                     ///< its serial number; empty: it has none
   std::uint32_t dof_mask = 0;             ///< sensed and actuated axes: kAllDofs, kTranslationDofs
   double workspace_radius = 0.0;          ///< [m] about the device's centre
   double rotation_range = 0.0;            ///< [rad] from the centre to the end stop, about any axis
@@ -77,7 +81,7 @@ enum class DeviceFault : std::uint8_t {
 /// One reading of a device, in its frame D: origin at the centre of the workspace; x right, y away from the
 /// user, z up.
 struct DeviceState {
-  std::uint64_t seq = 0;  ///< number of the reading
+  std::uint64_t seq = 0;  ///< number of the reading: another one for each that is new
   Pose X_DH;
   Twist V_DH;
   std::uint32_t buttons = 0;  ///< bit i: button i is pressed
@@ -111,8 +115,11 @@ struct HandView {
 /// command is held until the next one, and there is none before the first write after arm(); a watchdog of
 /// the device turns the forces off when writes stop.
 ///
-/// Threads: read and write from one servo thread, one cycle being read, then write; arm and resetFault from
-/// any, while no other one uses the device. Real-time: read, write, disarm.
+/// A device may pace the loop: then a cycle begins when it has a new reading (awaitReading). Of two that
+/// could, a station is paced by the first one.
+///
+/// Threads: read, write and awaitReading from one servo thread, one cycle being read, then write; arm and
+/// resetFault from any, while no other one uses the device. Real-time: read, write, disarm, awaitReading.
 class HapticDevice {
  public:
   virtual ~HapticDevice() = default;
@@ -123,6 +130,12 @@ class HapticDevice {
   virtual void disarm() noexcept = 0;
   /// From fault to open. Called on behalf of an operator who has inspected the device.
   [[nodiscard]] virtual Result<void> resetFault() = 0;
+  /// Whether its readings come by a clock of its own, which can be waited for: nominally each millisecond,
+  /// and within 1e-4 of that in the long run. One that measures more often counts each n-th as a reading.
+  [[nodiscard]] virtual bool paces() const noexcept { return false; }
+  /// Waits for a reading that is newer than that of the last read(), `longest` at most; true: there is one.
+  /// False at once where none can come.
+  [[nodiscard]] virtual bool awaitReading(std::chrono::nanoseconds /*longest*/) noexcept { return false; }
   /// The newest reading; does not wait. Once the communication is lost: the last one, with the fault set.
   virtual void read(DeviceState& state) noexcept = 0;
   /// The command to display until the next write. Ignored unless armed; one that is not finite is a fault.

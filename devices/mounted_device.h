@@ -23,6 +23,10 @@ class MountedDevice final : public HapticDevice {
   [[nodiscard]] Result<void> arm() override { return device_.arm(); }
   void disarm() noexcept override { device_.disarm(); }
   [[nodiscard]] Result<void> resetFault() override { return device_.resetFault(); }
+  [[nodiscard]] bool paces() const noexcept override { return device_.paces(); }
+  [[nodiscard]] bool awaitReading(std::chrono::nanoseconds longest) noexcept override {
+    return device_.awaitReading(longest);
+  }
   void read(DeviceState& state) noexcept override {
     device_.read(state);
     state.X_DH = Pose(q_DM_ * state.X_DH.translation(), q_DM_ * state.X_DH.rotation() * q_DM_.conjugate());

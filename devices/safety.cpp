@@ -1,6 +1,7 @@
 #include "devices/safety.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "idl/types/messages/hands.h"
 
@@ -15,11 +16,17 @@ constexpr std::uint64_t kReportInterval = 10'000;  ///< [ticks] between reports 
 
 /// Rules that act in normal operation, without a defect.
 constexpr bool isRoutine(SafetyRule rule) noexcept {
-  constexpr std::uint32_t kRoutine =
-      bit(SafetyRule::kAgeFading) | bit(SafetyRule::kStiffnessLimited) | bit(SafetyRule::kSoftStart) |
-      bit(SafetyRule::kSlewLimited) | bit(SafetyRule::kPassivity) | bit(SafetyRule::kWorkspaceWall) |
-      bit(SafetyRule::kForceLimited) | bit(SafetyRule::kMotorSaturated) | bit(SafetyRule::kClutchWarning);
+  constexpr std::uint32_t kRoutine = bit(SafetyRule::kAgeFading) | bit(SafetyRule::kStiffnessLimited) |
+                                     bit(SafetyRule::kSoftStart) | bit(SafetyRule::kSlewLimited) |
+                                     bit(SafetyRule::kPassivity) | bit(SafetyRule::kWorkspaceWall) |
+                                     bit(SafetyRule::kForceLimited) | bit(SafetyRule::kMotorSaturated) |
+                                     bit(SafetyRule::kClutchWarning) | bit(SafetyRule::kNotArmed);
   return (bit(rule) & kRoutine) != 0;
+}
+
+bool isFiniteRequest(const SafetyRequest& request) noexcept {
+  return isFinite(request.requested.F_Ho_D) && std::isfinite(request.stiffness) &&
+         std::isfinite(request.rotational_stiffness);
 }
 
 }  // namespace
@@ -37,8 +44,13 @@ DeviceCommand Safety::step(const SafetyRequest& request, const DeviceState& stat
   forces_on_ = forcesPermitted(request, state) && !command.brake;
   if (forces_on_) {
     const bool late = !(request.age <= limits_.fade_from);
+    const bool finite = isFiniteRequest(request);
+    setFlag(SafetyRule::kNonFinite, !finite);
     // a force that is late while it starts may be of any stretch: it starts again once it is fresh
-    if (request.restart || (late_ && !late) || (late && starting_)) restart();
+    if (!finite)
+      startFromZero();
+    else if (request.restart || (late_ && !late) || (late && starting()))
+      restart();
     late_ = late;
     const Wrench damping = injectDamping(state, dt);
     const Wrench requested = prepareRequest(request);
@@ -51,6 +63,7 @@ DeviceCommand Safety::step(const SafetyRequest& request, const DeviceState& stat
     wall_since_ = 0.0;
     wall_.setZero();
     wall_lags_ = false;
+    wall_was_slow_ = false;
     wall_distance_ = state.X_DH.translation().norm();
     heat_.update(0.0, dt, limits_);
   }
@@ -74,6 +87,7 @@ bool Safety::evaluateStops(const SafetyRequest& request, const DeviceState& stat
   // emergency stop
   stopped_ = stopped_ || request.emergency_stop || state.fault == DeviceFault::kEmergencyStop;
   setFlag(SafetyRule::kEmergencyStop, stopped_);
+  setFlag(SafetyRule::kNotArmed, !request.armed);
 
   // clutch: the order of comparisons makes a NaN measurement open it
   if (limits_.clutch_force > 0.0) {
@@ -92,7 +106,7 @@ bool Safety::evaluateStops(const SafetyRequest& request, const DeviceState& stat
   const double speed = state.V_DH.linear.norm();
   braking_ = !(speed <= (braking_ ? kBrakeReleaseFraction : 1.0) * limits_.max_speed);
   setFlag(SafetyRule::kOverspeed, braking_);
-  return stopped_ || open || braking_;
+  return stopped_ || !request.armed || open || braking_;
 }
 
 bool Safety::forcesPermitted(const SafetyRequest& request, const DeviceState& state) noexcept {
@@ -105,10 +119,7 @@ bool Safety::forcesPermitted(const SafetyRequest& request, const DeviceState& st
 
 Wrench Safety::prepareRequest(const SafetyRequest& request) noexcept {
   Wrench wrench = request.requested.F_Ho_D;
-  if (!isFinite(wrench)) {
-    setFlag(SafetyRule::kNonFinite, true);
-    return {};
-  }
+  if (acts(SafetyRule::kNonFinite)) return {};
   if (limits_.dof_mask != kAllDofs) {
     for (int axis = 0; axis < 3; ++axis) {
       if ((limits_.dof_mask >> axis & 1U) == 0) wrench.force[axis] = 0.0;
@@ -133,7 +144,7 @@ void Safety::restart() noexcept {
     leaving_ = slewed_ + leaving_ * leaving_share_;
     leaving_share_ = 1.0;
   }
-  starting_ = true;
+  force_starting_ = torque_starting_ = true;
   since_start_ = 0.0;
   slewed_ = {};
   passivity_.forgive();
@@ -142,34 +153,49 @@ void Safety::restart() noexcept {
 void Safety::startFromZero() noexcept {
   restart();
   settled_force_ = 0.0;
+  settled_torque_ = 0.0;
   leaving_share_ = 0.0;
 }
 
 double Safety::startLimit() const noexcept { return std::max(settled_force_, limits_.start_force); }
 
+Wrench Safety::clampedInRamp(const Wrench& wrench) const noexcept {
+  if (!inRamp()) return wrench;
+  return {clampNorm(wrench.force, std::max(0.0, startLimit() - wall_.norm())),
+          clampNorm(wrench.torque, std::max(settled_torque_, limits_.start_torque))};
+}
+
+void Safety::keepSettled() noexcept {
+  if (late_) return;
+  if (!force_starting_)
+    settled_force_ = std::min((slewed_.force + wallBesideScene()).norm(), heat_.forceLimit(limits_));
+  if (!torque_starting_) settled_torque_ = std::min(slewed_.torque.norm(), limits_.torque);
+}
+
 Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double wall_growth,
                                      double dt) noexcept {
-  // what was displayed, so not what hot motors took away
-  if (!late_ && !starting_)
-    settled_force_ = std::min((slewed_.force + wallBesideScene()).norm(), heat_.forceLimit(limits_));
+  keepSettled();
   const double start = softStartFactor(since_start_, limits_);
   const double growth = std::min(dt, kLongestGrowth);
+  // the damping of what starts grows with it
+  const Wrench growing{force_starting_ ? damping.force : Vector3::Zero(),
+                       torque_starting_ ? damping.torque : Vector3::Zero()};
+  const Wrench ramped = clampedInRamp(wrench * start + growing);
   since_start_ += growth;
-  const bool starting = starting_;
-  Wrench ramped = wrench * start;
-  if (starting) ramped += damping;  // it grows with the force
-  if (start < 1.0) ramped.force = clampNorm(ramped.force, std::max(0.0, startLimit() - wall_.norm()));
-  const double force_step = starting_ ? std::max(0.0, limits_.start_force_slew * growth - wall_growth)
-                                      : limits_.force_slew * growth;
-  const double torque_slew = starting_ ? limits_.start_torque_slew : limits_.torque_slew;
+  const double force_step = force_starting_ ? std::max(0.0, limits_.start_force_slew * growth - wall_growth)
+                                            : limits_.force_slew * growth;
+  const double torque_slew = torque_starting_ ? limits_.start_torque_slew : limits_.torque_slew;
   slewed_ = {slewLimited(slewed_.force, ramped.force, force_step),
              slewLimited(slewed_.torque, ramped.torque, torque_slew * growth)};
-  const bool behind = slewed_.force != ramped.force || slewed_.torque != ramped.torque;
-  starting_ = starting_ && (start < 1.0 || behind);
-  setFlag(SafetyRule::kSoftStart, starting_);
-  setFlag(SafetyRule::kSlewLimited, behind && !starting_);
+  const bool force_behind = slewed_.force != ramped.force;
+  const bool torque_behind = slewed_.torque != ramped.torque;
+  force_starting_ = force_starting_ && (start < 1.0 || force_behind);
+  torque_starting_ = torque_starting_ && (start < 1.0 || torque_behind);
+  setFlag(SafetyRule::kSoftStart, starting());
+  setFlag(SafetyRule::kSlewLimited,
+          (force_behind && !force_starting_) || (torque_behind && !torque_starting_));
   leaving_share_ = std::max(0.0, leaving_share_ - dt / kLeavingTime);
-  return slewed_ + leaving_ * leaving_share_ + (starting ? Wrench{} : damping);
+  return slewed_ + leaving_ * leaving_share_ + damping + -growing;
 }
 
 Wrench Safety::injectDamping(const DeviceState& state, double dt) noexcept {
@@ -178,34 +204,45 @@ Wrench Safety::injectDamping(const DeviceState& state, double dt) noexcept {
   return damping;
 }
 
-/// A gap of the scene leaves a wall that stands standing; one that is met in the gap or in the soft start
-/// grows as slowly as the scene's force, since the hand fell into it.
+/// A workspace wall that already acts keeps its force over a gap. One first reached during a gap or soft
+/// start grows at the soft-start rate, until it is that of its spring, however long this takes.
 double Safety::rampWall(const Vector3& scene, double stiffness, const DeviceState& state,
                         double dt) noexcept {
   const Vector3& p_DH = state.X_DH.translation();
   const double growth = std::min(dt, kLongestGrowth);
   const double before = wall_.norm();
-  Vector3 wall = wallForce(p_DH, limits_) * softStartFactor(wall_since_, limits_);
-  if (starting_) wall = clampNorm(wall, std::max(before, startLimit()));
-  // what the scene's spring leaves at once, the rest slowly
+  const bool slow = force_starting_ || late_ || wall_since_ < limits_.soft_start;
+  if (wall_was_slow_ && !slow && before < wallForce(wall_distance_, limits_)) wall_lags_ = true;
+  wall_was_slow_ = slow;
   const double stiffness_left = std::min(wallStiffnessBeside(scene, stiffness, p_DH, limits_),
                                          wallStiffnessBeside(sceneForce(), stiffness, p_DH, limits_));
-  if (wall_lags_ || stiffness_left < limits_.wall_stiffness) {
-    const double step = limits_.start_force_slew * growth;
-    const double beyond = std::max(wall_distance_, limits_.wall_radius);
-    const double moved = std::max(std::min(0.0, p_DH.norm() - wall_distance_), p_DH.norm() - beyond);
-    const double followed = before + stiffness_left * moved;
-    double force = std::max(0.0, std::clamp(wall.norm(), followed - step, followed + step));
-    if (starting_) force = std::min(force, std::max(before, startLimit()));
-    wall_lags_ = force != wall.norm();
-    if (wall_lags_) wall = -force * p_DH.normalized();
-  }
-  const bool slow = starting_ || late_ || wall_since_ < limits_.soft_start;
-  wall_ = slewLimited(wall_, wall, (slow ? limits_.start_force_slew : limits_.force_slew) * growth);
+  wall_ = slewLimited(wall_, limitedBesideScene(wallTarget(p_DH), stiffness_left, p_DH, growth),
+                      (slow ? limits_.start_force_slew : limits_.force_slew) * growth);
   wall_since_ += growth;
   wall_distance_ = p_DH.norm();
   setFlag(SafetyRule::kWorkspaceWall, !wall_.isZero(0.0));
   return std::max(0.0, wall_.norm() - before);
+}
+
+Vector3 Safety::wallTarget(const Vector3& p_DH) const noexcept {
+  const Vector3 wall = wallForce(p_DH, limits_) * softStartFactor(wall_since_, limits_);
+  return inRamp() ? clampNorm(wall, std::max(wall_.norm(), startLimit())) : wall;
+}
+
+/// The stiffness left beside the scene's spring acts at once; what the wall lacks of its spring's force, or
+/// has beyond it, comes and goes by 20 N/s.
+Vector3 Safety::limitedBesideScene(const Vector3& wall, double stiffness_left, const Vector3& p_DH,
+                                   double growth) noexcept {
+  if (!wall_lags_ && stiffness_left >= limits_.wall_stiffness) return wall;
+  const double before = wall_.norm();
+  const double step = limits_.start_force_slew * growth;
+  const double beyond = std::max(wall_distance_, limits_.wall_radius);
+  const double moved = std::max(std::min(0.0, p_DH.norm() - wall_distance_), p_DH.norm() - beyond);
+  const double followed = before + stiffness_left * moved;
+  double force = std::max(0.0, std::clamp(wall.norm(), followed - step, followed + step));
+  if (inRamp()) force = std::min(force, std::max(before, startLimit()));
+  wall_lags_ = force != wall.norm();
+  return wall_lags_ ? Vector3(-force * p_DH.normalized()) : wall;
 }
 
 Vector3 Safety::wallBesideScene() const noexcept {
@@ -237,7 +274,9 @@ Wrench Safety::limitOutput(const Wrench& wrench, double dt) noexcept {
 }
 
 bool Safety::wantsDisarm() const noexcept {
-  return (flags_ & (bit(SafetyRule::kEmergencyStop) | bit(SafetyRule::kClutchOpen))) != 0;
+  constexpr std::uint32_t kDisarming =
+      bit(SafetyRule::kEmergencyStop) | bit(SafetyRule::kNotArmed) | bit(SafetyRule::kClutchOpen);
+  return (flags_ & kDisarming) != 0;
 }
 
 void Safety::reset() noexcept {

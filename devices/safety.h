@@ -26,6 +26,7 @@ struct SafetyRequest {
   double stiffness = 0.0;  ///< [N/m] of the spring that made the force; 0: the force is not a spring's
   double rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
   bool dead_man_held = true;
+  bool armed = true;            ///< by the person at the device: otherwise the brake acts, and it is disarmed
   bool emergency_stop = false;  ///< engages the latched stop
 };
 
@@ -46,15 +47,17 @@ struct Intervention {
 /// A force may fall at once and grow only at the slew rate. Clutch and emergency stop are latched until
 /// reset(), which an operator triggers after an inspection; the other rules end with their cause, and those
 /// that removed the force are followed by a soft start: a ramp of one second, in which the force is not above
-/// 3 N or what it was before. In the ramp, and until the force is the requested one, it grows by 20 N/s at
-/// most. Time is the sum of `dt`, which the caller measures; no clock is read. However long a step took,
-/// forces grow in it as in 2 ms at most.
+/// 3 N or what it was before, nor a torque above SafetyLimits::start_torque or what it was. In the ramp, and
+/// then until it is the requested one, a force grows by 20 N/s at most, a torque by start_torque_slew; each
+/// settles on its own, so that the one never keeps what the other was before an earlier gap.
+/// Time is the sum of `dt`, which the caller measures; no clock is read. However long a step took, forces
+/// grow in it as in 2 ms at most.
 ///
 /// Scene and workspace wall are springs of one hand: with one contact they are together no stiffer than what
-/// the device renders passively. The wall adds what the scene's force towards the centre lacks of the wall's
-/// own. Where the scene pushes outwards, the wall follows the hand with the stiffness that the scene's spring
-/// leaves, and the rest of its force comes and goes by 20 N/s; within the wall's radius it fades at that
-/// rate.
+/// the device renders passively. The wall adds the difference between the wall force and the scene force's
+/// component towards the centre. Where the scene pushes outwards, the wall follows the hand with the
+/// stiffness that the scene's spring leaves, and the rest of its force comes and goes by 20 N/s; within the
+/// wall's radius it fades at that rate.
 ///
 /// Threads: the device's servo thread. Real-time: everything but the constructor.
 class Safety {
@@ -69,7 +72,8 @@ class Safety {
   /// Rules that acted in the last step, as bits of SafetyRule.
   [[nodiscard]] std::uint32_t flags() const noexcept { return flags_; }
   [[nodiscard]] bool acts(SafetyRule rule) const noexcept { return (flags_ & bit(rule)) != 0; }
-  /// A stop is latched: the caller writes the command, which brakes, and then disarms the device.
+  /// A stop is latched, or the device is not armed: the caller writes the command, which brakes, and then
+  /// disarms the device.
   [[nodiscard]] bool wantsDisarm() const noexcept;
   /// Forces were permitted in the last step.
   [[nodiscard]] bool forcesOn() const noexcept { return forces_on_; }
@@ -85,6 +89,9 @@ class Safety {
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
 
   [[nodiscard]] const SafetyLimits& limits() const noexcept { return limits_; }
+  /// Of the motors, which outlasts this layer: the next one of the device begins with it.
+  [[nodiscard]] const MotorThermalModel& heat() const noexcept { return heat_; }
+  void setHeat(const MotorThermalModel& heat) noexcept { heat_ = heat; }
   /// [J] energy balance of the port: taken from the hand minus delivered to it.
   [[nodiscard]] double energy() const noexcept { return passivity_.energy(); }
 
@@ -93,11 +100,11 @@ class Safety {
   // ---- stages of step(), in this order
   /// Energy balance over `dt` [s].
   void observePort(const DeviceState& state, double dt) noexcept;
-  /// Emergency stop, clutch and speed; true: brake.
+  /// Emergency stop, arming, clutch and speed; true: brake.
   [[nodiscard]] bool evaluateStops(const SafetyRequest& request, const DeviceState& state) noexcept;
   /// Dead-man switch and state of the device.
   [[nodiscard]] bool forcesPermitted(const SafetyRequest& request, const DeviceState& state) noexcept;
-  /// Non-finite values, axes the device lacks, age and stiffness.
+  /// Axes the device lacks, age and stiffness; nothing of a request that is not finite.
   [[nodiscard]] Wrench prepareRequest(const SafetyRequest& request) noexcept;
   /// Soft start; what was displayed falls to zero meanwhile, within 20 ms.
   void restart() noexcept;
@@ -107,6 +114,14 @@ class Safety {
   [[nodiscard]] Wrench injectDamping(const DeviceState& state, double dt) noexcept;
   /// [N] what scene and wall together may be in a soft start: 3 N, or what was displayed before.
   [[nodiscard]] double startLimit() const noexcept;
+  [[nodiscard]] bool starting() const noexcept { return force_starting_ || torque_starting_; }
+  /// The second of a soft start in which force and torque are limited.
+  [[nodiscard]] bool inRamp() const noexcept { return since_start_ < limits_.soft_start; }
+  /// What was displayed, so not what hot motors took away, of a force or torque that is not late and does not
+  /// start.
+  void keepSettled() noexcept;
+  /// The scene's share of what may be displayed in it.
+  [[nodiscard]] Wrench clampedInRamp(const Wrench& wrench) const noexcept;
   /// `wall_growth` [N] in this step, which together with the scene's is limited; `dt` [s].
   [[nodiscard]] Wrench applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double wall_growth,
                                              double dt) noexcept;
@@ -114,11 +129,16 @@ class Safety {
   /// [N].
   [[nodiscard]] double rampWall(const Vector3& scene, double stiffness, const DeviceState& state,
                                 double dt) noexcept;
+  /// [N] force of the wall's spring, ramped after arming and limited in a soft start.
+  [[nodiscard]] Vector3 wallTarget(const Vector3& p_DH) const noexcept;
+  /// [N] what of `wall` may act beside a scene that leaves it `stiffness_left` [N/m]; `growth` [s].
+  [[nodiscard]] Vector3 limitedBesideScene(const Vector3& wall, double stiffness_left, const Vector3& p_DH,
+                                           double growth) noexcept;
   /// [N] the scene's, without injected damping, as it was displayed last.
   [[nodiscard]] Vector3 sceneForce() const noexcept {
     return slewed_.force + leaving_.force * leaving_share_;
   }
-  /// [N] what the scene's force towards the centre lacks of the wall's.
+  /// [N] the difference between the wall force and the scene force's component towards the centre.
   [[nodiscard]] Vector3 wallBesideScene() const noexcept;
   void fadeTactors(const SafetyRequest& request, DeviceCommand& command) const noexcept;
   /// Command, thermal and motor limits; `dt` [s].
@@ -138,16 +158,19 @@ class Safety {
   bool forces_on_ = false;
   bool late_ = false;               ///< the last request had begun to fade
   double fade_ = 1.0;               ///< [-] of its force that the age of the last request left
-  bool starting_ = true;            ///< soft start, until the force is the requested one
+  bool force_starting_ = true;      ///< soft start, until the force is the requested one
+  bool torque_starting_ = true;     ///< likewise
   double since_start_ = 0.0;        ///< [s] since the forces came on
   Wrench slewed_;                   ///< last output of the slew limit
-  double settled_force_ = 0.0;      ///< [N] last one before the force was late or started
+  double settled_force_ = 0.0;      ///< [N] last one before it was late or started
+  double settled_torque_ = 0.0;     ///< [Nm] likewise
   Wrench leaving_;                  ///< that was displayed when the force restarted
   double leaving_share_ = 0.0;      ///< [-] of it that is left
   Vector3 wall_ = Vector3::Zero();  ///< [N] last output of the workspace wall
   double wall_since_ = 0.0;         ///< [s] since forces are permitted
   double wall_distance_ = 0.0;      ///< [m] of the hand from the centre, in the last step
   bool wall_lags_ = false;          ///< it is not yet the force of its spring again
+  bool wall_was_slow_ = false;      ///< it grew as a force that starts, in the last step
   Wrench output_;                   ///< last commanded wrench
   Pose X_DH_last_;
   bool has_last_pose_ = false;

@@ -11,7 +11,9 @@ constexpr double kSmallForce = 0.01;          ///< [N] a scene's force below it 
 constexpr double kStorageTravel = 0.02;       ///< [m] energy capacity = peak force along this displacement
 constexpr double kActiveSpeed = 0.01;         ///< [m/s] active power = peak force at this speed
 constexpr double kDeratingStart = 0.8;        ///< [-] motor heat above which the force limit falls
-constexpr double kMinDampedSpeed = 1e-4;      ///< [m/s], [rad/s] no damping is injected below
+/// [m] from the wrist to the grip: a force of the soft start there is a torque of the wrist.
+constexpr double kWristLever = 0.1;
+constexpr double kMinDampedSpeed = 1e-4;  ///< [m/s], [rad/s] no damping is injected below
 
 /// K <= b / (T/2 + delay): Colgate's passivity condition with a transport delay. `limit` caps the result.
 double maxPassiveStiffness(double limit, double damping, const DeviceCaps& caps) {
@@ -57,6 +59,8 @@ const char* toString(SafetyRule rule) noexcept {
       return "emergency stop";
     case SafetyRule::kForcesOff:
       return "forces off";
+    case SafetyRule::kNotArmed:
+      return "not armed";
   }
   return "unknown rule";
 }
@@ -83,8 +87,13 @@ SafetyLimits safetyLimits(const DeviceCaps& caps) noexcept {
   limits.force_quantum = caps.force_quantum;
   limits.energy_capacity = limits.peak_force * kStorageTravel;
   limits.active_power = limits.peak_force * kActiveSpeed;
-  if (limits.peak_force > 0.0)
-    limits.start_torque_slew = limits.start_force_slew * limits.torque / limits.peak_force;
+  if (limits.peak_force > 0.0) {
+    // a wrist is not re-anchored: it is turned no harder than a hand is pushed, and by no larger share of
+    // what the device can do
+    const double lever = std::min(kWristLever, limits.torque / limits.peak_force);
+    limits.start_torque = limits.start_force * lever;
+    limits.start_torque_slew = limits.start_force_slew * lever;
+  }
   return limits;
 }
 
@@ -115,10 +124,14 @@ Vector3 slewLimited(const Vector3& output, const Vector3& target, double step) n
   return direction * std::min(size, kept + step);
 }
 
+double wallForce(double distance, const SafetyLimits& limits) noexcept {
+  if (limits.wall_radius <= 0.0) return 0.0;
+  return limits.wall_stiffness * std::max(0.0, distance - limits.wall_radius);
+}
+
 Vector3 wallForce(const Vector3& p_DH, const SafetyLimits& limits) noexcept {
-  const double beyond = p_DH.norm() - limits.wall_radius;
-  if (limits.wall_radius <= 0.0 || beyond <= 0.0) return Vector3::Zero();
-  return p_DH.normalized() * (-limits.wall_stiffness * beyond);
+  const double force = wallForce(p_DH.norm(), limits);
+  return force > 0.0 ? Vector3(-force * p_DH.normalized()) : Vector3::Zero();
 }
 
 double wallStiffnessBeside(const Vector3& scene, double stiffness, const Vector3& p_DH,

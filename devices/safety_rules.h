@@ -9,7 +9,8 @@ namespace tenon::devices {
 
 /// Rules of the safety layer, one bit each.
 enum class SafetyRule : std::uint32_t {
-  kNonFinite = 1U << 0U,         ///< a requested force is NaN or infinite: zero force instead
+  kNonFinite =
+      1U << 0U,  ///< a requested wrench or stiffness is NaN or infinite: zero force, then a soft start
   kAgeFading = 1U << 1U,         ///< the force fades because its request is old
   kStale = 1U << 2U,             ///< the request is too old: no force, then a soft start
   kStiffnessLimited = 1U << 3U,  ///< the force is scaled to the stiffness the device renders passively
@@ -25,10 +26,11 @@ enum class SafetyRule : std::uint32_t {
   kClutchOpen = 1U << 13U,       ///< both arms stopped; latched
   kDeadMan = 1U << 14U,          ///< dead-man switch released: no force
   kEmergencyStop = 1U << 15U,    ///< latched
-  kForcesOff = 1U << 16U,        ///< the device is not armed or in fault
+  kForcesOff = 1U << 16U,        ///< the device has no forces on or is in fault
+  kNotArmed = 1U << 17U,         ///< the person has not armed the device: brake, no force
 };
 
-inline constexpr int kSafetyRules = 17;
+inline constexpr int kSafetyRules = 18;
 
 [[nodiscard]] constexpr std::uint32_t bit(SafetyRule rule) { return static_cast<std::uint32_t>(rule); }
 /// Text for messages and logs.
@@ -62,7 +64,8 @@ struct SafetyLimits {
   double soft_start = 1.0;         ///< [s] duration of the ramp
   double start_force = 3.0;        ///< [N] largest force in it, or that before it
   double start_force_slew = 20.0;  ///< [N/s] largest growth of the force in it
-  double start_torque_slew = 0.0;  ///< [Nm/s] likewise: the largest torque takes as long as the largest force
+  double start_torque = 0.0;       ///< [Nm] as start_force, for torques
+  double start_torque_slew = 0.0;  ///< [Nm/s] as start_force_slew
 };
 
 [[nodiscard]] SafetyLimits safetyLimits(const DeviceCaps& caps) noexcept;
@@ -81,7 +84,9 @@ struct SafetyLimits {
 /// Output of the next cycle, from `output` towards `target`: a decrease or a change of direction acts at
 /// once, the component along `target` grows by at most `step` [N or Nm].
 [[nodiscard]] Vector3 slewLimited(const Vector3& output, const Vector3& target, double step) noexcept;
-/// [N] inward force of the spring outside `wall_radius`; zero inside.
+/// [N] of the spring outside `wall_radius`, at `distance` [m] from the centre; zero inside.
+[[nodiscard]] double wallForce(double distance, const SafetyLimits& limits) noexcept;
+/// [N] inward force of that spring.
 [[nodiscard]] Vector3 wallForce(const Vector3& p_DH, const SafetyLimits& limits) noexcept;
 /// [N/m] of that spring which a scene's spring of `stiffness` [N/m] with force `scene` [N] leaves it at p_DH:
 /// all where the scene does not push outwards, else so much that both are in no direction stiffer than the

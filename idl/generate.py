@@ -14,9 +14,9 @@ USAGE = "//@topic NAME stream|state|event [PARAMETER...]"
 CLASSES = {"stream": "kStream", "state": "kState", "event": "kEvent"}
 TIMES = ("deadline", "lease", "lifespan")
 DEPTHS = {"late_joiner_depth": 1000, "reader_depth": 16}  # and an example
-FLAGS = ("lease_by_topic", "latched", "of_server")
-MEMBERS = ("deadline", "lease", "lease_by_topic", "lifespan", "late_joiner_depth", "reader_depth", "latched", "of_server")  # of TopicParameters
-PARAMETERS = "deadline=10ms, lease=1000ms, lifespan=5000ms, late_joiner_depth=1000, reader_depth=16, lease_by_topic, latched or of_server"
+FLAGS = ("lease_by_topic", "latched", "of_server", "request")
+MEMBERS = ("deadline", "lease", "lease_by_topic", "lifespan", "late_joiner_depth", "reader_depth", "latched", "of_server", "request")  # of TopicParameters
+PARAMETERS = "deadline=10ms, lease=1000ms, lifespan=5000ms, late_joiner_depth=1000, reader_depth=16, lease_by_topic, latched, of_server or request"
 
 
 class Fault(Exception):
@@ -71,6 +71,8 @@ class Topic:
             raise Fault(self.line, "'reader_depth' is for streams: leave it out (readers keep all events, and of a state the last)")
         if "latched" in self.parameters and self.qos_class != "state":
             raise Fault(self.line, f"'latched' is for states: leave it out, or write {self.name} state latched")
+        if "request" in self.parameters and (self.qos_class != "event" or "of_server" in self.parameters):
+            raise Fault(self.line, "'request' is for events of clients, who wait for the server's answer: leave it out")
         if "lease_by_topic" in self.parameters and "lease" not in self.parameters:
             raise Fault(self.line, "'lease_by_topic' says which lease is meant: write lease=50ms before it")
         if self.qos_class == "state":

@@ -1,7 +1,11 @@
+#include <algorithm>
 #include <atomic>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,6 +19,7 @@
 #include "idl/types/cache_folder.h"
 #include "idl/types/number_range.h"
 #include "idl/types/output_files.h"
+#include "idl/types/result.h"
 #include "idl/wire/identity.h"
 #include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
@@ -32,7 +37,12 @@ namespace {
 
 std::atomic<bool> stop_requested = false;
 
-void onStopSignal(int) { stop_requested = true; }
+std::atomic<std::uint32_t> stop_signals = 0;
+
+void onStopSignal(int) {
+  ++stop_signals;
+  stop_requested = true;
+}
 
 constexpr int kWrongUsage = 2;
 constexpr const char* kStopped = "stopped while the scene was prepared";
@@ -117,8 +127,8 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
                "re-simulate although scenario or structures have changed since the recording, to see where "
                "it differs");
   app.footer(
-      "Exit code: 0 when every step was done (or all hashes of the re-simulation were equal and no tick is "
-      "missing), 1 otherwise; 2 for wrong usage.");
+      "Exit code: 0 when every step was done (or all hashes of the re-simulation were equal, no tick is "
+      "missing and the file records how the run ended), 1 otherwise; 2 for wrong usage.");
 }
 
 void printLine(const std::string& text) {
@@ -161,9 +171,30 @@ std::string describe(const tenon::session::JournalGap& gap) {
   if (gap.first == 1)
     return fmt::format("ticks 1 to {} are not compared: no checkpoint before them can be read", gap.last);
   const std::string missing = fmt::format("ticks {} to {} are missing", gap.first, gap.last);
+  if (gap.is_at_end) return missing + ": the run went on, the inputs end";
   return gap.compared_after == 0
-             ? missing + ", and no checkpoint follows: the rest is not compared"
+             ? missing + ", and no checkpoint follows them: the rest is not compared"
              : fmt::format("{}: compared again after the checkpoint of tick {}", missing, gap.compared_after);
+}
+
+/// How much was compared, and what was not: all of it counted, the begin of it named.
+void printGaps(const tenon::session::ResimulationReport& report) {
+  constexpr std::size_t kMostNamed = 10;
+  const std::size_t gaps = report.gaps.size();
+  printLine(fmt::format("ticks {} to {}: {} compared, {} gap{}{}", report.first, report.last, report.compared,
+                        gaps, gaps == 1 ? "" : "s",
+                        gaps == 0 ? "" : fmt::format(" of {} ticks in all", report.gapTicks())));
+  for (std::size_t i = 0; i < std::min(gaps, kMostNamed); ++i) printLine(describe(report.gaps[i]));
+  if (gaps > kMostNamed) printLine(fmt::format("and {} more gaps", gaps - kMostNamed));
+}
+
+/// What is known of a run whose end its file lacks.
+std::string describeMissingEnd(const std::string& file, const tenon::session::ResimulationReport& report) {
+  return fmt::format(
+      "{} reaches tick {} and does not record how the run ended: the program that wrote it was killed, still "
+      "runs, or could not write any more, as to a disk that hung; what came after that tick is not known{}",
+      file, report.reached,
+      report.is_journal ? fmt::format(" (`tenon serve --resume {}` continues the session there)", file) : "");
 }
 
 int resimulateFile(const ServeArguments& arguments, const tenon::session::LoadedScene& loaded) {
@@ -173,16 +204,15 @@ int resimulateFile(const ServeArguments& arguments, const tenon::session::Loaded
   tenon::session::SessionSimulation simulation(loaded.scenario, loaded.scene, arguments.session.simulation);
   const auto report = tenon::session::resimulate(arguments.resimulate, simulation);
   if (!report) return reportError(report.error().what);
-  printLine(fmt::format("ticks {} to {}: {} compared, {} gaps", report->first, report->last, report->compared,
-                        report->gaps.size()));
-  for (const tenon::session::JournalGap& gap : report->gaps) printLine(describe(gap));
+  printGaps(*report);
   if (!report->problem.empty()) printLine(report->problem);
+  if (report->has_no_end) printLine(describeMissingEnd(arguments.resimulate, *report));
   if (report->first_difference) {
     printLine(fmt::format("first difference: tick {}", *report->first_difference));
     return 1;
   }
   printLine(fmt::format("final state hash: {:016x}", report->final_hash));
-  return report->gaps.empty() && !report->is_damaged ? 0 : 1;
+  return report->gaps.empty() && !report->is_damaged && !report->has_no_end ? 0 : 1;
 }
 
 /// Checks before anything is baked what the scenario's text suffices for; the exit code, 0 for none.
@@ -199,88 +229,123 @@ int checkArguments(const ServeArguments& arguments) {
   return refusal ? reportError(refusal->what, refusal->exit_code) : 0;
 }
 
-int serve(ServeArguments& arguments) {
+using Copy = std::optional<tenon::session::UnpackedScenario>;
+
+/// Takes from the journal or recording `file` what the command line does not say: limits, level of detail,
+/// and the scenario, whose files `copy` holds where the file has them. The exit code, 0 for none.
+int readOrigin(const std::string& file, ServeArguments& arguments, Copy& copy) {
   const bool resumes = !arguments.resume.empty();
-  std::optional<tenon::session::UnpackedScenario> unpacked;
-  std::string missing;  ///< why the journal's own copy of its scenario cannot be used
-  if (const std::string& file = resumes ? arguments.resume : arguments.resimulate; !file.empty()) {
-    if (std::error_code error;
-        std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error))
-      return reportError(file + ": is no file");
-    const auto origin = tenon::session::readJournalOrigin(file);
-    if (!origin && resumes)
-      return reportError(origin.error().what + "; begin a new session with --journal and another file");
-    if (!origin && !resumes)
-      if (const auto recording = tenon::record::McapReader::open(file); !recording)
-        return reportError(recording.error().what);
-    if (!origin && arguments.scenario.empty())
-      return reportError(origin.error().what + "; name it as well, as in: tenon resimulate " + file +
-                         " scenarios/engine_bay");
-    if (origin) arguments.session.simulation.limits = origin->limits;
-    if (origin && (resumes || !arguments.states_detail)) arguments.load.detail = origin->detail;
-    if (arguments.scenario.empty() && !resumes) {
-      auto copy = tenon::session::UnpackedScenario::of(file);
-      if (copy) arguments.scenario = unpacked.emplace(std::move(*copy)).path().string();
-      if (!copy) missing = copy.error().what;
-    }
-    if (arguments.scenario.empty()) {
-      const auto scenario = tenon::session::findScenario(file, *origin);
-      if (!scenario) return reportError((missing.empty() ? "" : missing + "; ") + scenario.error().what);
-      arguments.scenario = scenario->string();
-    }
+  if (std::error_code error;
+      std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error))
+    return reportError(file + ": is no file");
+  const auto origin = tenon::session::readJournalOrigin(file);
+  if (!origin && resumes)
+    return reportError(origin.error().what + "; begin a new session with --journal and another file");
+  if (!origin)
+    if (const auto recording = tenon::record::McapReader::open(file); !recording)
+      return reportError(recording.error().what);
+  if (!origin && arguments.scenario.empty())
+    return reportError(origin.error().what + "; name it as well, as in: tenon resimulate " + file +
+                       " scenarios/engine_bay");
+  if (!origin) return 0;
+  arguments.session.simulation.limits = origin->limits;
+  if (resumes || !arguments.states_detail) arguments.load.detail = origin->detail;
+  if (!arguments.scenario.empty()) return 0;
+  std::string missing;  ///< why the file's own copy of its scenario cannot be used
+  if (!resumes) {
+    auto unpacked = tenon::session::UnpackedScenario::of(file);
+    if (unpacked) arguments.scenario = copy.emplace(std::move(*unpacked)).path().string();
+    if (unpacked) return 0;
+    missing = unpacked.error().what + "; ";
   }
+  const auto scenario = tenon::session::findScenario(file, *origin);
+  if (!scenario) return reportError(missing + scenario.error().what);
+  arguments.scenario = scenario->string();
+  return 0;
+}
+
+/// Of the session, from --key or the user's runtime folder, where the first server makes it.
+tenon::Result<tenon::wire::SharedKey> readKey(const std::filesystem::path& key_file) {
+  if (!key_file.empty()) {
+    auto key = tenon::wire::readOrMakeKeyFile(key_file);
+    if (!key) return tenon::fail("--key: " + key.error().what);
+    return key;
+  }
+  const auto runtime = tenon::wire::runtimeFolder();
+  if (!runtime) return tenon::fail(runtime.error().what + "; or name a file with --key");
+  return tenon::wire::readOrMakeKeyFile(*runtime / "key");
+}
+
+using Say = std::function<void(const std::string&)>;
+
+/// For people, how the session went.
+void describeSession(const tenon::session::SessionReport& report, const Say& say) {
+  say(fmt::format("{} after {:.1f} s; late ticks: {}; refused inputs: {}", report.run.reason,
+                  static_cast<double>(report.run.tick) * tenon::kTickSeconds, report.late_ticks,
+                  report.refused_inputs));
+  if (report.slow_writes > 0 || report.failed_writes > 0)
+    say(fmt::format("writes to the bus that took longer than 5 ms: {}, the longest {:.1f} ms; failed: {}",
+                    report.slow_writes, 1e3 * report.longest_write, report.failed_writes));
+  if (report.dropped_outputs > 0)
+    say(fmt::format("ticks that were not published: {}", report.dropped_outputs));
+  if (report.lost_journal_ticks > 0)
+    say(fmt::format("{} tick{} missing in the journal", report.lost_journal_ticks,
+                    report.lost_journal_ticks == 1 ? " is" : "s are"));
+  if (!report.journal_problem.empty())
+    say(fmt::format("the journal ended before the session: {}", report.journal_problem));
+  say(fmt::format("final state hash: {:016x}", report.run.final_hash));
+}
+
+/// Opens the session and runs it to its end.
+int serve(ServeArguments& arguments, const tenon::session::LoadedScene& loaded) {
+  printProblems(loaded);
+  for (const std::string& sentence : tenon::session::thinWallReport(*loaded.scene)) printLine(sentence);
+  tenon::session::SessionOptions& session = arguments.session;
+  const auto key = readKey(arguments.key_file);
+  if (!key) return reportError(key.error().what);
+  session.key = *key;
+  session.stop_file = tenon::session::defaultStopFile(session.domain, session.name);
+  if (session.stop_file.empty()) reportError(tenon::session::kNoStopFile);
+  // a terminal that stands still does not stop the session
+  std::optional<tenon::threads::LinePrinter> printer(tenon::threads::LinePrinter::kOutput);
+  const Say say = [&printer](const std::string& text) { printer->print(text); };
+  // a session without pictures is a session
+  const auto models = tenon::session::storeAssets(loaded, arguments.load);
+  if (stop_requested) return reportError(kStopped);
+  if (models) session.scene_hash = *models;
+  if (!models) say("the console will show boxes instead of parts: " + models.error().what);
+  session.print = say;
+  session.signals = &stop_signals;
+  session.detail = arguments.load.detail;
+  session.resume = !arguments.resume.empty();
+  if (session.resume) session.journal = arguments.resume;
+  auto server = tenon::session::SessionServer::open(loaded, session);
+  if (!server) return reportError(server.error().what);
+  const auto report = (*server)->run(stop_requested);
+  if (!report) return reportError(report.error().what);
+  describeSession(*report, say);
+  if (report->left_journal) {
+    printer.reset();  // prints what waits
+    std::_Exit(1);    // destroys nothing: a thread waits for the disk
+  }
+  return tenon::isCompleted(report->run, arguments.allow_skips) ? 0 : 1;
+}
+
+/// Loads the scene, for a session or a re-simulation.
+int run(ServeArguments& arguments) {
+  Copy copy;  // of a journal's scenario, for as long as it is read
+  const bool resimulates = !arguments.resimulate.empty();
+  if (const std::string& file = resimulates ? arguments.resimulate : arguments.resume; !file.empty())
+    if (const int wrong = readOrigin(file, arguments, copy); wrong != 0) return wrong;
   if (arguments.scenario.empty())
     return reportError("name a scenario, as in: tenon serve scenarios/engine_bay", kWrongUsage);
-  if (arguments.resimulate.empty())
+  if (!resimulates)
     if (const int wrong = checkArguments(arguments); wrong != 0) return wrong;
   arguments.load.stop = &stop_requested;
   const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load, showLoading);
   if (stop_requested) return reportError(kStopped);
   if (!loaded) return reportError(loaded.error().what);
-  if (!arguments.resimulate.empty()) return resimulateFile(arguments, *loaded);
-  printProblems(*loaded);
-
-  for (const std::string& sentence : tenon::session::thinWallReport(*loaded->scene)) printLine(sentence);
-  const auto runtime = tenon::wire::runtimeFolder();
-  if (!runtime && arguments.key_file.empty())
-    return reportError(runtime.error().what + "; or name a file with --key");
-  const auto key =
-      tenon::wire::readOrMakeKeyFile(arguments.key_file.empty() ? *runtime / "key" : arguments.key_file);
-  if (!key) return reportError((arguments.key_file.empty() ? "" : "--key: ") + key.error().what);
-  arguments.session.key = *key;
-  arguments.session.stop_file =
-      tenon::session::defaultStopFile(arguments.session.domain, arguments.session.name);
-  if (arguments.session.stop_file.empty()) reportError(tenon::session::kNoStopFile);
-  // a terminal that stands still does not stop the session
-  tenon::threads::LinePrinter printer(tenon::threads::LinePrinter::kOutput);
-  const auto say = [&printer](const std::string& text) { printer.print(text); };
-  arguments.session.print = say;
-  arguments.session.detail = arguments.load.detail;
-  // a session without pictures is a session
-  const auto models = tenon::session::storeAssets(*loaded, arguments.load);
-  if (stop_requested) return reportError(kStopped);
-  if (models) arguments.session.scene_hash = *models;
-  if (!models) say("the console will show boxes instead of parts: " + models.error().what);
-  arguments.session.resume = resumes;
-  if (resumes) arguments.session.journal = arguments.resume;
-  auto server = tenon::session::SessionServer::open(*loaded, arguments.session);
-  if (!server) return reportError(server.error().what);
-  const auto report = (*server)->run(stop_requested);
-  if (!report) return reportError(report.error().what);
-  say(fmt::format("{} after {:.1f} s; late ticks: {}; refused inputs: {}", report->run.reason,
-                  static_cast<double>(report->run.tick) * tenon::kTickSeconds, report->late_ticks,
-                  report->refused_inputs));
-  if (report->slow_writes > 0 || report->failed_writes > 0)
-    say(fmt::format("writes to the bus that took longer than 5 ms: {}, the longest {:.1f} ms; failed: {}",
-                    report->slow_writes, 1e3 * report->longest_write, report->failed_writes));
-  if (report->dropped_outputs > 0)
-    say(fmt::format("ticks that were not published: {}", report->dropped_outputs));
-  if (report->lost_journal_ticks > 0)
-    say(fmt::format("{} ticks are missing in the journal", report->lost_journal_ticks));
-  if (!report->journal_problem.empty())
-    say(fmt::format("the journal ended before the session: {}", report->journal_problem));
-  say(fmt::format("final state hash: {:016x}", report->run.final_hash));
-  return tenon::isCompleted(report->run, arguments.allow_skips) ? 0 : 1;
+  return resimulates ? resimulateFile(arguments, *loaded) : serve(arguments, *loaded);
 }
 
 }  // namespace
@@ -304,5 +369,5 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onStopSignal);
   // a limit on the size of files is an error of the write, as a full disk is
   std::signal(SIGXFSZ, SIG_IGN);
-  return serve(arguments);
+  return run(arguments);
 }

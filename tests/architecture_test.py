@@ -114,7 +114,7 @@ version""".split())
 UNITS = {
     # the stages of one bake; bake.h has their options and results
     "server/bake/bake": "server/bake/{air_gaps,brick_level,exposed_surface,face_sides,feature_bake,field_bake,field_size,filled_spaces,flood,narrow_gaps,"
-                        "outside,parallel,refined_bricks,shell_bake,slope_limit,thin_bricks,thin_places,triangle_pieces,"
+                        "outside,parallel,refined_bricks,shell_bake,slope_limit,thin_bricks,thin_places,triangle_pieces,valley_bake,"
                         "welded_mesh}",
     "server/collision/pair_query": "server/collision/{contact_blocks,contact_reducer,query_kernels,ridge_correction,tangent_probes,valley_correction,"
                                    "*_lanes_inl}",

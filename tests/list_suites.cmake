@@ -1,5 +1,5 @@
 # Writes LIST: a ctest test for each suite of a GoogleTest PROGRAM. Run after the program was linked. Suites are nightly by the
-# end of their name, or by NIGHTLY_SUITES, and have the label `numbers` by NUMBER_SUITES; both list them without the prefix of an
+# end of their name, or by NIGHTLY_SUITES (`.*` is all), and have the label `numbers` by NUMBER_SUITES; both list them without the prefix of an
 # instantiation.
 cmake_policy(SET CMP0007 NEW)
 cmake_policy(SET CMP0057 NEW)
@@ -18,7 +18,7 @@ foreach(line IN LISTS suites)
   set(label gate)
   set(timeout 900)
   string(REGEX REPLACE "^[^/]*/" "" class "${suite}")
-  if(suite MATCHES "Nightly(/|$)" OR suite IN_LIST NIGHTLY_SUITES OR class IN_LIST NIGHTLY_SUITES)
+  if(NIGHTLY_SUITES STREQUAL ".*" OR suite MATCHES "Nightly(/|$)" OR suite IN_LIST NIGHTLY_SUITES OR class IN_LIST NIGHTLY_SUITES)
     set(label nightly)
     set(timeout 3600)
   endif()

@@ -16,7 +16,6 @@ namespace {
 
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kPatience{5};   // for an answer
-constexpr milliseconds kForAServer{3000};      // to repeat an emergency stop, discovery included
 constexpr milliseconds kBetweenTellings{500};  // of raises of the emergency stop
 constexpr milliseconds kForRaises{1000};       // to hear of the raises of the emergency stop
 constexpr milliseconds kResend{500};           // an answer sent before our reader was matched is lost
@@ -105,11 +104,12 @@ void CommandClient::receive(const NewestRaise& newest) {
 /// Of many raises at a rate that a person can read.
 void CommandClient::tellNewest() {
   if (!newest_ || told_ == newest_->number) return;
-  if (newest_->standing > 0 && report) {
+  if (newest_->standing > 0) {
+    if (!report_raise) return;
     const auto now = std::chrono::steady_clock::now();
     if (now < next_telling_) return;
     next_telling_ = now + kBetweenTellings;
-    report(describe(*newest_));
+    report_raise(describe(*newest_));
   }
   told_ = newest_->number;
 }
@@ -137,8 +137,11 @@ Result<void> CommandClient::rejoin(const Stop& stop) {
 Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& stop) {
   ack_.reset();
   const bool is_clear = command.command == CommandKind::kClearEmergencyStop;
-  if (is_clear && !command.value)
+  if (is_clear && !command.value) {
     (void)dispatchUntil(stop, kForRaises, [this] { return newest_.has_value(); });
+    next_telling_ = {};  // what it names is told, whatever was told before
+    tellNewest();
+  }
   const double value = command.value.value_or(is_clear && newest_ ? newest_->number : 0.0);
   const Command message{member_->welcome().client, ++sent_, *command.command, {}, command.text, value};
   const auto until = std::chrono::steady_clock::now() + kPatience;
@@ -156,17 +159,33 @@ Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& s
 }
 
 int emergencyOnce(const wire::MembershipOptions& options, const ParsedCommand& command,
-                  const std::atomic<bool>& stop) {
+                  const RaisePatience& patience, const std::atomic<bool>& stop) {
+  // as servers and stations, which may leave an overloaded machine no time for others; where it is permitted
+  static_cast<void>(wire::raiseWireThreads());
   auto raiser = StopRaiser::open(options.domain, options.session, options.person);
+  static_cast<void>(wire::raiseWireThreads());  // of DDS, which has begun
+  const auto textOf = [&options](const StopHeard& heard) {
+    const auto outcome = outcomeOf(heard, options.domain, options.session);
+    return outcome ? *outcome : outcome.error().what;
+  };
+  const auto tell = [&textOf](const StopHeard& heard) {
+    std::fprintf(stderr,
+                 "emergency: not confirmed yet: %s; it is repeated until it is confirmed, Ctrl-C ends that; "
+                 "use the devices' own switches\n",
+                 textOf(heard).c_str());
+  };
   const std::string reason = command.text.empty() ? "requested" : command.text;
-  const auto heard = raiser ? (*raiser)->raise(reason, kForAServer, stop) : fail(raiser.error().what);
-  const auto outcome = heard ? outcomeOf(*heard, options.domain, options.session) : fail(heard.error().what);
-  if (!outcome) {
-    std::fprintf(stderr, "tenon command: %s\n", outcome.error().what.c_str());
+  const auto heard = raiser ? (*raiser)->raise(reason, patience, stop, tell) : fail(raiser.error().what);
+  if (!heard) {
+    std::fprintf(stderr, "tenon command: %s\n", heard.error().what.c_str());
     return 1;
   }
-  std::printf("emergency: %s\n", outcome->c_str());
-  return 0;
+  if (heard->isConfirmed() || heard->isObeyedWithoutServer()) {
+    std::printf("emergency: %s\n", textOf(*heard).c_str());
+    return 0;
+  }
+  std::fprintf(stderr, "tenon command: %s\n", textOf(*heard).c_str());
+  return 1;
 }
 
 }  // namespace tenon::command

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/command/parser.h"
+#include "clients/command/stop_raiser.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/result.h"
 #include "idl/wire/membership.h"
@@ -57,11 +58,13 @@ class CommandClient {
   /// Membership::rejoin.
   [[nodiscard]] Result<void> rejoin(const Stop& stop);
   [[nodiscard]] const std::string& sessionName() const { return member_->sessionName(); }
-  /// NewestRaise::number of the emergency stop, of which `report` was told.
+  /// NewestRaise::number of the emergency stop, of which `report_raise` was told.
   [[nodiscard]] std::uint32_t toldRaise() const { return told_; }
 
   /// Called with one line per change of step or run; may be empty.
   std::function<void(const std::string&)> report;
+  /// Called with a line about the newest raise that stands, when it is another one; may be empty.
+  std::function<void(const std::string&)> report_raise;
 
  private:
   CommandClient(wire::MembershipOptions options, std::function<void()> meanwhile)
@@ -89,10 +92,11 @@ class CommandClient {
   wire::Inbox inbox_;
 };
 
-/// Raises the emergency stop and prints who has obeyed it. Returns the exit code: 0 when a server has, or
-/// a station and all that listen have acknowledged it, else 1.
+/// Raises the emergency stop, as long as StopRaiser::raise does, and prints who has obeyed it. Returns the
+/// exit code: 0 when the server of each announced session has, or, where none is announced, a station has and
+/// all that listen have acknowledged it, else 1.
 [[nodiscard]] int emergencyOnce(const wire::MembershipOptions& options, const ParsedCommand& command,
-                                const std::atomic<bool>& stop);
+                                const RaisePatience& patience, const std::atomic<bool>& stop);
 /// Sends the command of a command line and prints the answer. Returns the exit code: 0 when it was accepted,
 /// else 1.
 [[nodiscard]] int commandOnce(CommandClient& client, const std::vector<std::string>& arguments,

@@ -177,7 +177,7 @@ class KeyDesk {
     if (!client && !ended_) stayOutside(client.error().what);
     if (!client) return;
     client_ = std::move(*client);
-    client_->report = show;
+    client_->report = client_->report_raise = show;
     // a raise that stands is repeated by who has raised it, of all sessions before one was known
     const bool has_raised = next_raise_ != std::chrono::steady_clock::time_point{};
     if (!options_.session.empty() || has_raised) return;
@@ -267,10 +267,7 @@ int commandOnce(CommandClient& client, const std::vector<std::string>& arguments
   const auto command = parseCommand(arguments);
   const bool is_clear = command && command->command == CommandKind::kClearEmergencyStop;
   // what was not shown before is shown beside what becomes of it
-  if (is_clear)
-    client.report = [](const std::string& line) {
-      if (line.starts_with("emergency")) show(line);
-    };
+  if (is_clear) client.report_raise = show;
   const Result<void> sent = command ? client.send(*command, stop) : fail(command.error().what);
   if (sent) {
     show(nameOf(*command) + ": accepted");

@@ -1,12 +1,16 @@
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <unistd.h>
 
 #include "clients/command/command_program.h"
 #include "clients/command/session_lists.h"
@@ -25,6 +29,7 @@ struct CommandArguments {
   tenon::wire::MembershipOptions options{.role = tenon::Role::kInstructor};
   std::vector<std::string> words;
   std::vector<std::string> signals;
+  std::optional<std::chrono::seconds> wait;  ///< none: not given
   bool keys = false;
 };
 
@@ -59,8 +64,11 @@ void declare(CLI::App& app, CommandArguments& arguments) {
       ->capture_default_str();
   app.add_option_function<unsigned>(
          "--wait",
-         [&arguments](unsigned seconds) { arguments.options.timeout = std::chrono::seconds(seconds); },
-         "seconds to search for a server")
+         [&arguments](unsigned seconds) {
+           arguments.options.timeout = *(arguments.wait = std::chrono::seconds(seconds));
+         },
+         "seconds to search for a server; of an emergency stop, for which it is repeated at most, 3 or more "
+         "(default of that: until it is confirmed, without a terminal 30; 10 where nobody is found)")
       ->default_str("10");
   app.footer(tenon::command::commandHelp());
 }
@@ -75,6 +83,20 @@ int printLists(const CommandArguments& arguments) {
   if (!lists) return report(lists.error().what);
   std::fputs(lists->text().c_str(), stdout);
   return 0;
+}
+
+/// Of an emergency stop: a person at a terminal ends it with Ctrl-C, a script continues after some time.
+tenon::command::RaisePatience raisePatience(const CommandArguments& arguments) {
+  constexpr std::chrono::seconds kLeast{3};
+  constexpr std::chrono::seconds kOfAScript{30};
+  tenon::command::RaisePatience patience;
+  if (arguments.wait) {
+    patience.to_find = std::max(kLeast, *arguments.wait);
+    patience.in_all = patience.to_find;
+  } else if (isatty(STDERR_FILENO) == 0) {
+    patience.in_all = kOfAScript;
+  }
+  return patience;
 }
 
 int run(int argc, char** argv) {
@@ -94,10 +116,13 @@ int run(int argc, char** argv) {
     return report("usage: list, without '" + tenon::shortened(tenon::printable(arguments.words[1]), 60) +
                       "': it prints people, hands, steps and objects",
                   2);
+  if (arguments.keys && !arguments.words.empty())
+    return report("--keys takes no command: each key sends one", 2);
   if (!arguments.keys && !lists) {
     const auto parsed = tenon::command::parseCommand(arguments.words);
     if (!parsed) return report(parsed.error().what, 2);
-    if (!parsed->command) return tenon::command::emergencyOnce(arguments.options, *parsed, stop);
+    if (!parsed->command)
+      return tenon::command::emergencyOnce(arguments.options, *parsed, raisePatience(arguments), stop);
   }
   const std::filesystem::path& key_file = arguments.options.key_file;
   if (app.count("--key") > 0 && key_file.empty()) return report("--key: names no file", 2);

@@ -119,7 +119,9 @@ std::string commandHelp() {
     help += fmt::format("  {:<32}{}\n", fmt::format("{} {}", word.word, word.arguments), word.effect);
   return help +
          "\nThe server checks whether the role may give the command. Exit code: 0 when it was accepted,\n"
-         "1 when it was refused or not answered, 2 for wrong usage.";
+         "1 when it was refused or not answered, 2 for wrong usage. Of an emergency stop 0 when the server\n"
+         "of each announced session has confirmed it, or, where none is announced, a station has obeyed it\n"
+         "and all that listen have it, else 1.";
 }
 
 std::string keyLegend(const std::vector<std::string>& signals) {

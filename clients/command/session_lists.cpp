@@ -51,9 +51,13 @@ std::string SessionLists::text(const std::string& language) const {
   text += "hands\n";
   for (const auto& [id, hand] : hands) {
     const auto own = objects.find(hand.object);
-    text += fmt::format("  {:<24} {:<12} {:<24} without input still after {} ms, parked after {} ms\n",
-                        hand.name, roleName(hand.role), own == objects.end() ? "" : own->second.name,
-                        hand.limits.freeze_ticks, hand.limits.park_ticks);
+    text += fmt::format(
+        "  {:<24} {:<12} {:<24} without input still after {} ms, parked after {} ms{}\n", hand.name,
+        roleName(hand.role), own == objects.end() ? "" : own->second.name, hand.limits.freeze_ticks,
+        hand.limits.park_ticks,
+        hand.guidance_alone
+            ? fmt::format("; contacts are not felt, more than {:.0f} ms one way", 1e3 * kLongestContactDelay)
+            : "");
   }
   text += "steps\n";
   for (const auto& [index, step] : steps)

@@ -14,7 +14,7 @@ namespace tenon::command {
 namespace {
 using std::chrono::milliseconds;
 constexpr milliseconds kLateReaders{300};  // although a server has answered, others may not be discovered yet
-constexpr milliseconds kAcknowledged{500};
+constexpr milliseconds kListen{20};
 constexpr std::size_t kMaxReason = 255;  // [bytes] of tenon::EmergencyStop
 constexpr std::size_t kKept = 256;       // raises of which it is known who has heard them
 constexpr std::size_t kMostServers = 1024;
@@ -36,7 +36,7 @@ Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain, cons
            " no server has answered, it may hang or have ended";
   if (heard.programs == 0)
     return fail("nobody has heard the emergency stop: no program of " +
-                (session.empty() ? "any session" : "session '" + session + "'") + " runs on domain " +
+                (session.empty() ? "any session" : "session '" + session + "'") + " was found on domain " +
                 std::to_string(domain));
   const std::string silent = "no server has answered, it may hang or have ended";
   const std::string by_hand = "do not rely on it, stop the devices by hand";
@@ -96,7 +96,9 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
         [&self](const EmergencyClear& cleared, const wire::Origin& from) {
           if (cleared.client_guid != self.guid_ || !self.isServer(from)) return;
           self.repeat(cleared.counter, from);  // the server has heard it, also where others stand for it
-          static_cast<void>(self.stops_->dispose({cleared.client_guid, cleared.counter, {}, {}}));
+          if (cleared.counter >= self.counter_) self.withdraw(self.counter_);
+          // somebody else raises under this name, and its clear would name raises that are to come
+          if (cleared.counter > self.counter_) self.guid_ = wire::randomHex();
         });
   if (!all) return fail(all.error().what);
   // DDS matches this program's own reader at once, and may know of one of another program by now
@@ -104,15 +106,29 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
   return raiser;
 }
 
-Result<StopHeard> StopRaiser::raise(const std::string& reason, milliseconds patience,
-                                    const std::atomic<bool>& stop) {
+Result<StopHeard> StopRaiser::raise(const std::string& reason, const RaisePatience& patience,
+                                    const std::atomic<bool>& stop,
+                                    const std::function<void(const StopHeard&)>& tell) {
   const auto raised = write(reason);
   if (!raised) return fail(raised.error().what);
-  while (!stop && !heard(*raised, patience)) dispatch(milliseconds(20));
-  const bool acknowledged = stops_->waitForReaders(kAcknowledged);
-  StopHeard outcome = *heard(*raised, milliseconds(0));
-  outcome.acknowledged = acknowledged;
-  return outcome;
+  const auto begin = std::chrono::steady_clock::now();
+  auto next_telling = begin + patience.until_told;
+  while (true) {
+    dispatch(kListen);
+    StopHeard known = *heard(*raised, milliseconds(0));
+    known.acknowledged = isAcknowledged();
+    const auto now = std::chrono::steady_clock::now();
+    const auto elapsed = now - begin;
+    const bool is_nobody_there = known.programs == 0 && known.silent_sessions == 0;
+    if ((known.isConfirmed() && elapsed >= kLateReaders) ||
+        (known.isObeyedWithoutServer() && elapsed >= patience.until_told) ||
+        (is_nobody_there && elapsed >= patience.to_find) ||
+        (patience.in_all && elapsed >= *patience.in_all) || stop)
+      return known;
+    if (now < next_telling) continue;
+    next_telling = now + patience.between_tellings;
+    tell(known);
+  }
 }
 
 Result<std::uint32_t> StopRaiser::write(const std::string& reason) {
@@ -120,18 +136,24 @@ Result<std::uint32_t> StopRaiser::write(const std::string& reason) {
   if (auto sent = stops_->write({guid_, ++counter_, person_, shortened(printable(reason), kMaxReason)});
       !sent)
     return fail(sent.error().what);
+  withdraw(counter_ - 1);  // the newer one stands for it
   raises_.insert_or_assign(counter_, Raise{std::chrono::steady_clock::now(), {}});
   if (raises_.size() > kKept) raises_.erase(raises_.begin());
   return counter_;
 }
 
-/// Has heard it.
+/// It is not told any more to programs that come later.
+void StopRaiser::withdraw(std::uint32_t raise) {
+  if (raise != 0) static_cast<void>(stops_->dispose({guid_, raise, {}, {}}));
+}
+
+/// Has heard it, and all before it.
 void StopRaiser::repeat(std::uint32_t raise, const wire::Origin& from) {
-  const auto found = raises_.find(raise);
-  if (found == raises_.end()) return;
-  std::vector<wire::Origin>& repeaters = found->second.repeaters;
-  if (from.known() && repeaters.size() < kMostRepeaters && !contains(repeaters, from))
-    repeaters.push_back(from);
+  if (!from.known()) return;
+  for (auto at = raises_.begin(); at != raises_.end() && at->first <= raise; ++at) {
+    std::vector<wire::Origin>& repeaters = at->second.repeaters;
+    if (repeaters.size() < kMostRepeaters && !contains(repeaters, from)) repeaters.push_back(from);
+  }
 }
 
 bool StopRaiser::isServer(const wire::Origin& origin) const {

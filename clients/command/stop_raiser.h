@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -26,6 +27,21 @@ struct StopHeard {
 
   /// It stands in each session that it is for.
   [[nodiscard]] bool isConfirmed() const { return by_server && silent_sessions == 0; }
+  /// No server of its sessions is announced, a station has obeyed it, and all that listen have it.
+  [[nodiscard]] bool isObeyedWithoutServer() const {
+    return silent_sessions == 0 && !by_server && stations > 0 && acknowledged;
+  }
+};
+
+/// How long a raise is repeated that is not confirmed.
+struct RaisePatience {
+  using Milliseconds = std::chrono::milliseconds;
+
+  Milliseconds to_find{10'000};        ///< as long as no program is discovered that it is for
+  std::optional<Milliseconds> in_all;  ///< none: until it is confirmed, or `stop`
+  /// To discover servers beside the stations that have obeyed; then people are told what is known.
+  Milliseconds until_told{3000};
+  Milliseconds between_tellings{10'000};
 };
 
 /// What people are told of it: "accepted", or who has not answered. Fails when no server has, and
@@ -44,9 +60,12 @@ class StopRaiser {
                                                                 const std::string& session,
                                                                 const std::string& person);
 
-  /// Writes a raise, then waits for a server to repeat it, at most for `patience`, and until readers have it.
-  [[nodiscard]] Result<StopHeard> raise(const std::string& reason, std::chrono::milliseconds patience,
-                                        const std::atomic<bool>& stop);
+  /// Writes a raise and stays until it is confirmed by the server of each announced session, or, where none
+  /// is announced, obeyed by stations: DDS repeats it to who does not acknowledge it, and gives it to who is
+  /// discovered late, as long as this program runs. `tell` is told who has heard it meanwhile.
+  [[nodiscard]] Result<StopHeard> raise(const std::string& reason, const RaisePatience& patience,
+                                        const std::atomic<bool>& stop,
+                                        const std::function<void(const StopHeard&)>& tell);
 
   /// Writes a raise without waiting; returns its number for heard().
   [[nodiscard]] Result<std::uint32_t> write(const std::string& reason);
@@ -65,6 +84,7 @@ class StopRaiser {
   };
 
   StopRaiser() = default;
+  void withdraw(std::uint32_t raise);
   void repeat(std::uint32_t raise, const wire::Origin& from);
   [[nodiscard]] bool isServer(const wire::Origin& origin) const;
   [[nodiscard]] std::size_t silentSessions(const std::vector<wire::Origin>& repeaters) const;

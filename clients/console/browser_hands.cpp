@@ -19,7 +19,7 @@ using std::chrono::steady_clock;
 constexpr milliseconds kShowPeriod{16};
 constexpr milliseconds kAskAgain{300};  // for a hand that somebody else moves
 constexpr std::chrono::seconds kAskFor{6};
-constexpr std::chrono::seconds kNoView{10};  // without which the session has no such hands
+constexpr std::chrono::seconds kNoView{10};  // from the seat on, without which the session has no such hands
 constexpr const char* kTaken = "is already moved by somebody else";
 
 }  // namespace
@@ -74,7 +74,7 @@ class BrowserHands::Seat {
       is_whole = is_whole && views_[i].has_value();
       if (devices_[i]->isGone()) giveUp("nothing was heard of this page for 10 s");
     }
-    if (!is_shown_ && steady_clock::now() - begun_ > kNoView) giveUp("the session has no such hand");
+    if (!is_shown_ && steady_clock::now() > shown_until_.load()) giveUp("the session has no such hand");
     if (!is_new || !is_whole || stop_ || has_ended_) return nullptr;
     if (!is_shown_.exchange(true))
       answer_(viewer_, {request_.id, true, {}, std::string(roleName(membership_.role)), true});
@@ -121,6 +121,7 @@ class BrowserHands::Seat {
     haptic::StationProgramOptions program;
     program.membership = membership_;
     program.real_time = false;  // the memory of a gateway is not locked for one of its viewers
+    program.seated = [this] { shown_until_ = steady_clock::now() + kNoView; };
     return haptic::runStation(**station, program, stop_);
   }
 
@@ -131,7 +132,8 @@ class BrowserHands::Seat {
   const Print& print_;
   std::vector<std::shared_ptr<devices::BrowserDevice>> devices_;
   std::vector<std::optional<devices::RemoteView>> views_;  ///< the newest of each device
-  steady_clock::time_point begun_ = steady_clock::now();
+  /// When the first views have to be there; never as long as there is no seat, which is asked for in bounds.
+  std::atomic<steady_clock::time_point> shown_until_{steady_clock::time_point::max()};
   std::atomic<bool> is_shown_{false};
   std::atomic<const char*> why_{nullptr};  ///< of an end that is not the person's
   std::atomic<bool> stop_{false};

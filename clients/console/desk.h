@@ -41,8 +41,8 @@ class Desk {
   void handle(ViewerId viewer, const std::string& session, const DeskRequest& request);
   /// The viewer's seat is given up.
   void left(ViewerId viewer);
-  /// Prepares emergency stops for these sessions, so that they take effect at once; empty: for all. What was
-  /// prepared for others ends when a server has heard what was raised there.
+  /// Prepares emergency stops for these sessions, so that they take effect at once; empty: for all. Stoppers
+  /// of other sessions end once their raises are confirmed.
   void expect(const std::set<std::string>& sessions);
   /// Whether a recording that was started here runs.
   [[nodiscard]] bool records(const std::string& session) { return recordings_.records(session); }

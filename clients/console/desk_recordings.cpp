@@ -48,7 +48,7 @@ fs::path freeFile(const fs::path& folder, const std::string& session) {
 /// One recording and its thread.
 class DeskRecordings::One {
  public:
-  /// `begun`, then `ended`, are called by the thread; `begun` not when it fails before.
+  /// Answers the start when the recorder has joined, the stop when the file is complete.
   One(recorder::RecorderOptions options, const Answer& answer, ViewerId viewer, std::uint32_t request)
       : options_(std::move(options)), answer_(answer), asker_(Asker{viewer, request}) {
     options_.report = [this](const std::string&) {

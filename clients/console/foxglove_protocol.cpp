@@ -127,6 +127,8 @@ std::string statusText(StatusLevel level, std::string_view message) {
   return dump({{"op", "status"}, {"level", static_cast<int>(level)}, {"message", message}});
 }
 
+std::string heartbeatText() { return dump({{"op", "heartbeat"}}); }
+
 Result<ViewerRequest> parseViewerText(std::string_view text) {
   const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object()) return fail("a text that is no JSON object");

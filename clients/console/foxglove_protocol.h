@@ -14,8 +14,8 @@
 
 /// The Foxglove WebSocket protocol, version 1, server side: texts are JSON, messages binary and
 /// little-endian. Of its optional capabilities there are none. The operations that begin with `desk` or
-/// `hand` are ours, and so are binary messages of viewers, which are targets of hands, and those of
-/// kHandSubscription, which are what hands are shown: public viewers neither send nor get them.
+/// `hand` are ours, and so are `heartbeat`, binary messages of viewers, which are targets of hands, and those
+/// of kHandSubscription, which are what hands are shown: public viewers neither send nor get them.
 ///
 /// Threads: pure. Real-time: no.
 namespace tenon::console {
@@ -28,6 +28,8 @@ inline constexpr std::array<std::string_view, 2> kSubprotocols{"foxglove.sdk.v1"
 
 [[nodiscard]] std::string serverInfoText(std::string_view name, std::string_view session_id);
 [[nodiscard]] std::string advertiseText(const std::vector<Channel>& channels);
+/// Says only that the connection is there, since browsers do not show WebSocket pings to pages.
+[[nodiscard]] std::string heartbeatText();
 enum class StatusLevel { kInfo, kWarning, kError };
 [[nodiscard]] std::string statusText(StatusLevel level, std::string_view message);
 

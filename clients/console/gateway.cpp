@@ -189,8 +189,8 @@ Result<void> Gateway::followSessions() {
   return {};
 }
 
-/// Of the sessions of the lobby, as many as are permitted. Those that are no more, and that nobody looks at,
-/// make place.
+/// Of the sessions of the lobby, as many as are permitted. Feeds of ended sessions without viewers are closed
+/// first.
 void Gateway::offerFeeds(Lobby& lobby) {
   std::set<std::string> rooms{std::string(kFirstRoom)}, unserved;
   for (const std::string& name : lobby.names()) rooms.insert(roomOfSession(name));

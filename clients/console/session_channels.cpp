@@ -19,13 +19,14 @@ constexpr std::uint32_t kMostLives = 0x3fffffff;  // told: pages read it as a nu
 constexpr std::string_view kConsole = "/console";
 
 constexpr std::array kForwarded{
-    wire::kSceneObject.name,    wire::kSceneHand.name,       wire::kSceneStep.name,
-    wire::kObjectSnapshot.name, wire::kWorldFrame30.name,    wire::kWorldFrame100.name,
-    wire::kHandState100.name,   wire::kContactPairs100.name, wire::kTickStats100.name,
-    wire::kTelemetry.name,      wire::kStepState.name,       wire::kStepProgress.name,
-    wire::kRunState.name,       wire::kGrabState.name,       wire::kPresence.name,
-    wire::kRecorderStatus.name, wire::kEmergencyStop.name,   wire::kEmergencyClear.name,
-    wire::kNewestRaise.name,    wire::kEventLog.name,        wire::kClientEvent.name};
+    wire::kSceneObject.name,     wire::kSceneHand.name,      wire::kSceneStep.name,
+    wire::kSceneSignal.name,     wire::kSceneTitle.name,     wire::kObjectSnapshot.name,
+    wire::kWorldFrame30.name,    wire::kWorldFrame100.name,  wire::kHandState100.name,
+    wire::kContactPairs100.name, wire::kTickStats100.name,   wire::kTelemetry.name,
+    wire::kStepState.name,       wire::kStepProgress.name,   wire::kRunState.name,
+    wire::kGrabState.name,       wire::kPresence.name,       wire::kRecorderStatus.name,
+    wire::kEmergencyStop.name,   wire::kEmergencyClear.name, wire::kNewestRaise.name,
+    wire::kEventLog.name,        wire::kClientEvent.name};
 
 Delivery deliveryOf(std::string_view topic) {
   const bool is_event = topic == wire::kEventLog.name || topic == wire::kClientEvent.name;

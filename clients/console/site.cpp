@@ -18,6 +18,7 @@ namespace {
 constexpr std::string_view kAssets = "/assets/";
 constexpr std::string_view kGateway = "/gateway.json";
 constexpr std::string_view kRecording = "/recording.mcap";
+constexpr std::string_view kNoAsset = "there is no such asset\n";
 constexpr std::string_view kModelMagic = "glTF";
 constexpr std::string_view kBuiltFiles = "/page/";  ///< have a hash of their content in their names
 
@@ -48,18 +49,14 @@ constexpr std::string_view kNoPage =
     "<pre>deploy/setup console\ncmake --preset release\ncmake --build --preset release --target "
     "console_page</pre></html>";
 
-/// What is read first of the bytes of an asset: a binary glTF file, or a list.
-std::string_view typeOfAsset(const std::vector<std::uint8_t>& bytes) {
-  const bool is_model =
-      bytes.size() >= kModelMagic.size() && std::equal(kModelMagic.begin(), kModelMagic.end(), bytes.begin());
-  return is_model ? "model/gltf-binary" : "application/json";
-}
-
-std::vector<std::uint8_t> beginOf(const fs::path& file) {
+/// By its first bytes: a binary glTF file, or a list.
+std::string_view typeOfAsset(const fs::path& file) {
   std::string begin(kModelMagic.size(), '\0');
   std::ifstream(file, std::ios::binary).read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  return {begin.begin(), begin.end()};
+  return begin == kModelMagic ? "model/gltf-binary" : "application/json";
 }
+
+std::string_view pathOf(std::string_view target) { return target.substr(0, target.find_first_of("?#")); }
 
 /// A range of a file, or all of it.
 Answer partOf(const fs::path& file, std::string_view range) {
@@ -153,23 +150,35 @@ Result<void> Site::serveRecording(const fs::path& file) {
   return {};
 }
 
-Answer Site::answer(std::string_view target, std::string_view range, bool has_body) const {
-  const std::string_view path = target.substr(0, target.find_first_of("?#"));
+FileVersion versionOf(const fs::path& file) {
+  std::error_code ignored;
+  return {fs::file_size(file, ignored), fs::last_write_time(file, ignored)};
+}
+
+std::optional<std::string> Site::unchecked(std::string_view target) const {
+  const std::string_view path = pathOf(target);
+  if (!path.starts_with(kAssets) || !assets_.has(path.substr(kAssets.size()))) return std::nullopt;
+  const std::string_view name = path.substr(kAssets.size());
+  const auto known = checked_.find(name);
+  if (known != checked_.end() && known->second == versionOf(assets_.fileOf(name))) return std::nullopt;
+  return std::string(name);
+}
+
+void Site::setChecked(const std::string& name, const FileVersion& version) {
+  checked_.insert_or_assign(name, version);
+}
+
+Answer Site::answer(std::string_view target, std::string_view range) const {
+  const std::string_view path = pathOf(target);
   if (path == kRecording && !recording_.empty()) return partOf(recording_, range);
   if (path.starts_with(kAssets)) {
     const std::string_view name = path.substr(kAssets.size());
-    // who asks for parts checks the whole
-    if (!range.empty() && assets_.has(name)) return partOf(assets_.fileOf(name), range);
-    if (!has_body && assets_.has(name)) {
-      Answer head = partOf(assets_.fileOf(name), {});
-      head.type = typeOfAsset(beginOf(assets_.fileOf(name)));
-      head.is_immutable = true;
-      return head;
-    }
-    auto bytes = assets_.get(name);
-    if (!bytes) return text(404, "text/plain; charset=utf-8", "there is no such asset\n");
-    const std::string_view type = typeOfAsset(*bytes);
-    return {200, std::string(type), true, std::move(*bytes), {}};
+    if (!assets_.has(name)) return text(404, "text/plain; charset=utf-8", kNoAsset);
+    Answer answer = partOf(assets_.fileOf(name), range);
+    if (!range.empty() || answer.status != 200) return answer;  // who asks for parts checks the whole
+    answer.type = typeOfAsset(assets_.fileOf(name));
+    answer.is_immutable = true;
+    return answer;
   }
   const auto found = files_.find(path == "/" ? std::string_view("/index.html") : path);
   if (found != files_.end()) return found->second;
@@ -228,9 +237,24 @@ bool isAddress(std::string_view host) {
   return !name.empty() && std::all_of(name.begin(), name.end(), isOfDigits);
 }
 
+bool isHandshakeKey(std::string_view key) {
+  constexpr std::size_t kCharacters = 22;     // without the padding
+  constexpr std::string_view kLast = "AQgw";  // of the last one only two bits are used
+  const auto isOfBase64 = [](char c) {
+    return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '+' || c == '/';
+  };
+  return key.size() == kCharacters + 2 && key.ends_with("==") &&
+         std::all_of(key.begin(), key.begin() + kCharacters, isOfBase64) &&
+         kLast.find(key[kCharacters - 1]) != std::string_view::npos;
+}
+
 bool isLoopbackHost(std::string_view host) {
+  constexpr std::string_view kName = "localhost";
   host = nameOfHost(host);
-  return host == "localhost" || host == "127.0.0.1" || host == "[::1]";
+  // names of hosts have no case
+  const auto isSameLetter = [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; };
+  return std::equal(host.begin(), host.end(), kName.begin(), kName.end(), isSameLetter) ||
+         host == "127.0.0.1" || host == "[::1]";
 }
 
 }  // namespace tenon::console

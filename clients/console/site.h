@@ -21,6 +21,15 @@ struct FilePart {
   std::uint64_t size = 0;    ///< [bytes]
 };
 
+/// What is another where a file was written since.
+struct FileVersion {
+  std::uint64_t size = 0;  ///< [bytes]
+  std::filesystem::file_time_type written;
+
+  bool operator==(const FileVersion&) const = default;
+};
+[[nodiscard]] FileVersion versionOf(const std::filesystem::path& file);
+
 /// An answer to a GET request.
 struct Answer {
   unsigned status = 200;
@@ -35,7 +44,7 @@ struct Answer {
 /// their names, /gateway.json, which says what this gateway shows, and a recording, by ranges. A path of a
 /// request is looked up among them and never becomes a path of the file system.
 ///
-/// Threads: any. Real-time: no.
+/// Threads: one. Real-time: no.
 class Site {
  public:
   /// Reads all files below `page`, which may be missing: then `/` says how to build it.
@@ -46,16 +55,23 @@ class Site {
   /// Serves this file as /recording.mcap. Fails when it cannot be read.
   [[nodiscard]] Result<void> serveRecording(const std::filesystem::path& file);
 
-  /// `target`: as in the request line, with its query; `range`: the header Range; `has_body`: not for HEAD,
-  /// for which nothing of an asset but its kind is read.
-  [[nodiscard]] Answer answer(std::string_view target, std::string_view range = {},
-                              bool has_body = true) const;
+  /// The asset that `target` asks for, of which the content is to be checked before all of it is served: read
+  /// and compared with its name (wire::AssetStore::get), in some thread that may wait; none: nothing is.
+  [[nodiscard]] std::optional<std::string> unchecked(std::string_view target) const;
+  /// Remembers of a file of assets() as it was before its check that its content is right.
+  void setChecked(const std::string& name, const FileVersion& version);
+  [[nodiscard]] const wire::AssetStore& assets() const { return assets_; }
+
+  /// `target`: as in the request line, with its query; `range`: the header Range. Of files that are not the
+  /// page's nothing is read but what kind of asset it is.
+  [[nodiscard]] Answer answer(std::string_view target, std::string_view range = {}) const;
   [[nodiscard]] bool hasPage() const { return files_.contains("/index.html"); }
 
  private:
   std::map<std::string, Answer, std::less<>> files_;
   wire::AssetStore assets_;
-  std::filesystem::path recording_;  ///< empty: none
+  std::map<std::string, FileVersion, std::less<>> checked_;  ///< files of assets whose content is right
+  std::filesystem::path recording_;                          ///< empty: none
 };
 
 /// What is sent of a file, by the status of the answer: 206 these bytes, 200 all, 416 nothing, for the range
@@ -95,5 +111,7 @@ inline constexpr std::string_view kFirstRoom = "/live";
 /// Whether the header Host names this machine's loopback interface: a name that somebody else's DNS server
 /// points here does not.
 [[nodiscard]] bool isLoopbackHost(std::string_view host);
+/// Whether this is the Sec-WebSocket-Key of a handshake: 16 bytes in base64 (RFC 6455, section 4.2.1).
+[[nodiscard]] bool isHandshakeKey(std::string_view key);
 
 }  // namespace tenon::console

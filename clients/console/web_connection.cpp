@@ -90,7 +90,10 @@ void WebConnection::handle() {
   const Request request = parser_->release();
   const std::string_view host = toView(request[http::field::host]);
   const std::string_view target = toView(request.target());
-  if (!isPermittedHost(host)) {
+  // RFC 9112 section 3.2: of several a proxy may read another one than we do
+  if (request.count(http::field::host) > 1 || request.count(http::field::origin) > 1) {
+    respond(request, plain(400, "one Host and one Origin at most"));
+  } else if (!isPermittedHost(host)) {
     respond(request,
             plain(403, server_.certificate
                            ? "this server answers to the names in its certificate and to localhost"
@@ -111,10 +114,27 @@ void WebConnection::handle() {
     // If-Range: a range only of the content that the other side has; nothing here says which that is
     const bool is_get = request.method() == http::verb::get;
     const bool has_range = is_get && request.find(http::field::if_range) == request.end();
-    respond(request,
-            server_.site.answer(target, has_range ? toView(request[http::field::range]) : std::string_view(),
-                                is_get));
+    const std::string_view range = has_range ? toView(request[http::field::range]) : std::string_view();
+    const auto unchecked = is_get && range.empty() ? server_.site.unchecked(target) : std::nullopt;
+    if (unchecked) return check(request, *unchecked);
+    respond(request, server_.site.answer(target, range));
   }
+}
+
+/// Serves all of an asset once another thread has read it.
+void WebConnection::check(const Request& request, const std::string& name) {
+  const FileVersion version = versionOf(server_.site.assets().fileOf(name));
+  asio::post(server_.checker, [self = shared_from_this(), request, name, version,
+                               assets = server_.site.assets()]() mutable {
+    const bool is_right = assets.get(name).has_value();
+    asio::io_context& io = self->server_.io;
+    asio::post(io, [self = std::move(self), request = std::move(request), name, version, is_right] {
+      if (self->asking_ == self->server_.asking.end()) return;
+      if (!is_right) return self->respond(request, plain(404, "there is no such asset"));
+      self->server_.site.setChecked(name, version);
+      self->respond(request, self->server_.site.answer(toView(request.target())));
+    });
+  });
 }
 
 void WebConnection::handleUpgrade(const Request& request, std::string_view origin, std::string_view host) {
@@ -122,17 +142,19 @@ void WebConnection::handleUpgrade(const Request& request, std::string_view origi
   const std::string path = roomOf(toView(request.target()));
   if (!isPermittedOrigin(origin, host, stream_.isSecure(), server_.options.origins)) {
     respond(request, plain(403, "pages of this origin may not connect; --allow-origin permits it"));
+  } else if (!isHandshakeKey(toView(request[http::field::sec_websocket_key]))) {
+    respond(request, plain(400, "Sec-WebSocket-Key is not 16 bytes in base64"));
   } else if (!subprotocol) {
     respond(request, plain(400, "offer the subprotocol foxglove.sdk.v1 or foxglove.websocket.v1"));
-  } else if (!server_.rooms.contains(path)) {
-    respond(request,
-            plain(404, "there is no session of this name, or more sessions than this gateway shows"));
   } else {
     stream_.next_layer().expires_never();
-    const bool is_own_page = isPermittedOrigin(origin, host, stream_.isSecure(), {});
-    server_.makeRoomForViewer(host_);
-    std::make_shared<WebViewer>(server_, std::move(stream_), host_, path, is_own_page)
-        ->run(request, *subprotocol);
+    const bool is_own = isPermittedOrigin(origin, host, stream_.isSecure(), {});
+    const WebViewer::From from = !is_own          ? WebViewer::From::kElsewhere
+                                 : origin.empty() ? WebViewer::From::kProgram
+                                                  : WebViewer::From::kOwnPage;
+    // one without a room does not stay
+    if (server_.rooms.contains(path)) server_.makeRoomForViewer(host_);
+    std::make_shared<WebViewer>(server_, std::move(stream_), host_, path, from)->run(request, *subprotocol);
   }
 }
 

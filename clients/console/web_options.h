@@ -23,6 +23,7 @@ struct WebOptions {
   std::vector<std::string> recordings_from;  ///< origins of servers from which the page may read recordings
   std::string name = "tenon";                ///< of the server, for viewers
   std::chrono::milliseconds send_timeout{20'000};  ///< in which a connection has to take something
+  std::chrono::milliseconds heartbeat{2'000};      ///< from one heartbeat of the server's pages to the next
 };
 
 using ViewerId = std::uint64_t;  ///< of one connection; never used again

@@ -74,6 +74,18 @@ void WebService::accept() {
   });
 }
 
+void WebService::sendHeartbeats() {
+  heartbeat.expires_after(options.heartbeat);
+  heartbeat.async_wait([this](beast::error_code error) {
+    if (error) return;
+    // a viewer that is sent to may end, and leaves the set then
+    const std::vector<WebViewer*> all(viewers.begin(), viewers.end());
+    for (WebViewer* const viewer : all)
+      if (viewers.contains(viewer)) viewer->sendHeartbeat();
+    sendHeartbeats();
+  });
+}
+
 /// For a connection of `host`; false: there is nobody who could make room.
 bool WebService::makeRoom(const std::string& host) {
   // who was told to end had its time
@@ -104,6 +116,8 @@ void WebService::deliver(const std::string& path, const std::vector<Publication>
     const Channel* channel = store.find(publication.channel);
     if (channel == nullptr) {
       store.clear();
+      for (WebViewer* const viewer : viewers)
+        if (viewer->room() == path) viewer->dropMessages();
       continue;
     }
     store.keep(publication);
@@ -207,6 +221,7 @@ std::size_t WebServer::viewers() const { return impl_->viewer_count; }
 
 void WebServer::start() {
   impl_->accept();
+  impl_->sendHeartbeats();
   impl_->thread = std::thread([this] { impl_->io.run(); });
 }
 
@@ -252,6 +267,8 @@ void WebServer::show(ViewerId viewer, Payload views) {
 void WebServer::stop() {
   impl_->io.stop();
   if (impl_->thread.joinable()) impl_->thread.join();
+  impl_->checker.stop();
+  impl_->checker.join();
   impl_->handlers = {};  // viewers that end with this tell nobody
 }
 

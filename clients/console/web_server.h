@@ -24,17 +24,18 @@ struct WebService;  ///< in web_service.h
 /// https.
 ///
 /// HTTP: a Site. WebSocket: the Foxglove protocol, in rooms, which are paths; each has the channels of one
-/// session. A connection that takes nothing of what is sent for 20 s ends. A viewer has a ViewerQueue; one
-/// that sends more than 200 messages a second, or messages longer than 64 kB, is disconnected; 256 kB a
-/// second are read of it. The handshake of TLS and each request have 15 s. A request must name a loopback
-/// host or one of the certificate's, and a WebSocket one a permitted origin.
+/// session. Who asks for a room that is not there is told so by the reason of the close. Pages of this server
+/// get a heartbeat. A connection that takes nothing of what is sent for 20 s ends. A viewer has a
+/// ViewerQueue; one that sends more than 400 messages a second, or messages longer than 64 kB, is
+/// disconnected; 256 kB a second are read of it. The handshake of TLS and each request have 15 s. A request
+/// must name a loopback host or one of the certificate's, and a WebSocket one a permitted origin.
 ///
 /// Nobody is kept out by many others: of kMaxConnections, viewers without a place (a seat or hands) have
 /// kMaxViewers. When more viewers come, the oldest one without a place ends, told why; when more connections
 /// come, the one that has asked for nothing for longest: of the remote address that has most of them.
 ///
-/// Threads: open, start and stop from one thread; it has a thread of its own, which alone serves. The others
-/// from any. Real-time: no.
+/// Threads: open, start and stop from one thread; it has a thread of its own, which alone serves, and one
+/// that checks assets. The others from any. Real-time: no.
 class WebServer {
  public:
   static constexpr std::size_t kMaxConnections = 256;
@@ -57,7 +58,8 @@ class WebServer {
   /// Viewers that are there are disconnected.
   void removeRoom(const std::string& path);
   /// Hands messages to all viewers of the room that subscribe to their channels. One of channel 0: what late
-  /// subscribers would get is forgotten. Waits while the server has not yet taken the last 64 calls.
+  /// subscribers would get, and what viewers have yet to get, is forgotten. Waits while the server has not
+  /// yet taken the last 64 calls.
   void publish(const std::string& path, std::vector<Publication> publications);
   /// Sends the desk's answer to one viewer, if it is still there; a role in it is a place.
   void answer(ViewerId viewer, DeskAnswer answer);

@@ -20,7 +20,8 @@
 #include "clients/console/web_options.h"
 #include "clients/console/web_stream.h"
 
-/// The parts of the WebServer; nobody else includes this. All runs in the server's one thread.
+/// The parts of the WebServer; nobody else includes this. All runs in the server's one thread, but the checks
+/// of assets.
 namespace tenon::console {
 
 struct WebService;
@@ -28,8 +29,10 @@ struct WebService;
 /// One WebSocket connection. It lives as long as an operation of it is pending.
 class WebViewer : public std::enable_shared_from_this<WebViewer> {
  public:
-  /// `host`: whose connections are counted together; `is_own_page`: it is no page from elsewhere.
-  WebViewer(WebService& server, WebStream stream, std::string host, std::string room, bool is_own_page);
+  enum class From { kOwnPage, kProgram, kElsewhere };  ///< a page of this server, none, or another's
+
+  /// `host`: whose connections are counted together.
+  WebViewer(WebService& server, WebStream stream, std::string host, std::string room, From from);
   ~WebViewer();
   WebViewer(const WebViewer&) = delete;
   WebViewer& operator=(const WebViewer&) = delete;
@@ -41,6 +44,10 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
     queue_.add(kHandSubscription, Delivery::kNewest, {.payload = views});
   }
   void send();
+  /// What waits is of a session that is no more.
+  void dropMessages();
+  /// To a page of this server, so that it knows of a connection that has broken unnoticed.
+  void sendHeartbeat();
   /// The connection is closed: its room is no more.
   void leaveRoom();
   void close(const std::string& reason);
@@ -68,7 +75,7 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   ViewerId id_;
   std::string host_;
   std::string room_;
-  bool is_own_page_;
+  From from_;
   websocket::stream<WebStream> socket_;
   asio::steady_timer send_timer_;
   beast::flat_buffer incoming_;
@@ -104,6 +111,7 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   void handle();
   [[nodiscard]] bool isPermittedHost(std::string_view host) const;
   void handleUpgrade(const Request& request, std::string_view origin, std::string_view host);
+  void check(const Request& request, const std::string& name);
   struct Response;
   void respond(const Request& request, Answer answer);
   void send(const std::shared_ptr<Response>& response);
@@ -129,6 +137,7 @@ struct WebService {
   WebService(const WebOptions& web_options, Site web_site, WebHandlers web_handlers);
 
   void accept();
+  void sendHeartbeats();
   bool makeRoom(const std::string& host);
   /// One of `host` comes.
   void makeRoomForViewer(const std::string& host);
@@ -156,6 +165,8 @@ struct WebService {
   // after what connections refer to: they end with it
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
+  asio::steady_timer heartbeat{io};
+  asio::thread_pool checker{1};  ///< of assets; one at a time, so that one at most is in memory
   std::thread thread;
 };
 

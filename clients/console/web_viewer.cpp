@@ -10,17 +10,19 @@ namespace {
 using std::chrono::seconds;
 constexpr std::size_t kMaxMessageBytes = 64U << 10U;
 constexpr std::size_t kMaxSubscriptions = 256;
-constexpr int kMaxMessagesASecond = 200;
+/// A page with a hand sends 63, and those of 2.5 s at once to a gateway that has hung.
+constexpr int kMaxMessagesASecond = 400;
+constexpr const char* kNoSuchSession =
+    "there is no such session: it has ended or not begun, or this gateway shows too many";
 
 }  // namespace
 
-WebViewer::WebViewer(WebService& server, WebStream stream, std::string host, std::string room,
-                     bool is_own_page)
+WebViewer::WebViewer(WebService& server, WebStream stream, std::string host, std::string room, From from)
     : server_(server),
       id_(server.next_viewer++),
       host_(std::move(host)),
       room_(std::move(room)),
-      is_own_page_(is_own_page),
+      from_(from),
       socket_(std::move(stream)),
       send_timer_(server.io) {
   ++server_.connections;
@@ -89,14 +91,29 @@ void WebViewer::send() {
 }
 
 void WebViewer::begin() {
-  if (!server_.rooms.contains(room_)) return leaveRoom();  // removed meanwhile
   server_.viewers.insert(this);
   server_.viewer_count = server_.viewers.size();
   if (server_.handlers.entered) server_.handlers.entered(room_);
+  const auto room = server_.rooms.find(room_);
+  // told by a reason that pages can read: they are not shown the answer to a request that is refused
+  if (room == server_.rooms.end()) return close(kNoSuchSession);
   queue_.addText(serverInfoText(server_.options.name, server_.session_id));
-  queue_.addText(server_.rooms.find(room_)->second.advertisement);
+  queue_.addText(room->second.advertisement);
+  // with the first ones: a page watches a connection from the first heartbeat on
+  if (from_ == From::kOwnPage) queue_.addText(heartbeatText());
   send();
   read();
+}
+
+void WebViewer::dropMessages() {
+  for (const auto& [subscription, channel] : subscriptions_) queue_.remove(subscription);
+}
+
+/// Whatever else is being sent says the same.
+void WebViewer::sendHeartbeat() {
+  if (from_ != From::kOwnPage || is_sending_ || is_closing_) return;
+  queue_.addText(heartbeatText());
+  send();
 }
 
 void WebViewer::leaveRoom() { close("the session is over"); }
@@ -119,7 +136,7 @@ void WebViewer::receive() {
     received_ = 0;
   }
   if (++received_ > kMaxMessagesASecond) {
-    close("more than 200 messages a second");
+    close("more than 400 messages a second");
     return;
   }
   const std::string text = beast::buffers_to_string(incoming_.data());
@@ -135,7 +152,7 @@ void WebViewer::receive() {
 }
 
 void WebViewer::moveHands(std::span<const std::uint8_t> targets) {
-  const bool may = is_own_page_ && server_.handlers.hands;
+  const bool may = from_ != From::kElsewhere && server_.handlers.hands;
   if (!may || !server_.handlers.hands(id_, targets))
     queue_.addText(
         statusText(StatusLevel::kWarning, "a binary message that is no target of this viewer's hands"));
@@ -154,7 +171,7 @@ void WebViewer::apply(const ViewerRequest& request) {
   if (request.desk &&
       (request.desk->kind == DeskRequest::Kind::kSit || request.desk->kind == DeskRequest::Kind::kLeave))
     has_seat_ = false;
-  if (request.desk && is_own_page_ && server_.handlers.desk) {
+  if (request.desk && from_ != From::kElsewhere && server_.handlers.desk) {
     server_.handlers.desk(id_, room_, *request.desk);
   } else if (request.desk) {
     queue_.addText(deskAnswerText({.id = request.desk->id,

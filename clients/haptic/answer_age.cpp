@@ -14,9 +14,12 @@ void AnswerAge::step(std::uint32_t seq, std::uint32_t answered, double dt) noexc
   }
   if (answered == answered_) return;
   answered_ = answered;
+  const double since_last = std::min(now_ - answer_came_at_, kLongestPause);
+  answer_came_at_ = now_;
   const Read& read = reads_[answered % kRing];
   answered_read_at_ = read.seq == answered ? read.at : -kNever;
   delays_[0] = std::min(delays_[0], age());
+  too_long_for_ = delay() > (isTooLong() ? kShortAgain : kTooLong) ? too_long_for_ + since_last : 0.0;
 }
 
 double AnswerAge::excess() const noexcept {

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "idl/types/messages/timing.h"
+
 namespace tenon::haptic {
 
 /// Age of the server's answers on the station's own clock: time since the station read the input from which
@@ -20,23 +22,32 @@ class AnswerAge {
 
   /// [s] infinite before the first answer.
   [[nodiscard]] double age() const noexcept { return now_ - answered_read_at_; }
-  /// [s] age beyond what the link explains: its delay, and as much again or the jitter that was measured if
-  /// that is more. The delay is the smallest age of an answer in the last seconds with answers, at most
-  /// kLongestDelay.
+  /// [s] age minus link delay minus max(delay, jitter); >= 0. The delay is the smallest age of an answer in
+  /// the last seconds with answers, at most kLongestDelay.
   [[nodiscard]] double excess() const noexcept;
   /// `jitter` [s] of the age that was measured lately, 0 at first.
   void setJitter(double jitter) noexcept {
     jitter_ = jitter > 0.0 ? std::min(jitter, kLongestJitter) : 0.0;  // the order of comparisons: NaN is none
   }
   [[nodiscard]] std::uint32_t answered() const noexcept { return answered_; }
+  /// [s] of the link and back, as excess() has it but without a bound; infinite before the first answer.
+  [[nodiscard]] double delay() const noexcept { return std::min(delays_[0], delays_[1]); }
+  /// For a second at least each answer has been too old for contacts: the link's delay is above
+  /// kLongestContactDelay one way. Ends with the first answer that is not.
+  [[nodiscard]] bool isTooLong() const noexcept { return too_long_for_ >= kSure; }
 
-  static constexpr double kLongestDelay = 0.15;   ///< [s] a longer one is no link to render contacts by
+  static constexpr double kLongestDelay =
+      kLongestContactDelay;                       ///< [s] a longer one is no link to render contacts by
   static constexpr double kLongestJitter = 0.05;  ///< [s] a longer one is a gap
 
  private:
-  static constexpr std::size_t kRing = 1024;
+  static constexpr std::size_t kRing = 4096;
   static constexpr double kWindow =
       2.0;  ///< [s] each of two, with answers, in which the delay of the link is the smallest age
+  static constexpr double kTooLong = 2.0 * kLongestDelay + 0.02;  ///< [s] and back; 20 ms are the machines'
+  static constexpr double kShortAgain = kTooLong - 0.01;          ///< [s] likewise
+  static constexpr double kSure = 1.0;  ///< [s] a late answer after an interruption is no delay of the link
+  static constexpr double kLongestPause = 0.1;  ///< [s] between two answers that count towards it
   static constexpr double kNever = std::numeric_limits<double>::infinity();  ///< [s]
   struct Read {
     std::uint32_t seq = 0;
@@ -46,6 +57,8 @@ class AnswerAge {
   double now_ = 0.0;                   ///< [s] sum of dt
   double answered_read_at_ = -kNever;  ///< [s]
   double jitter_ = 0.0;                ///< [s]
+  double answer_came_at_ = -kNever;    ///< [s]
+  double too_long_for_ = 0.0;          ///< [s] with answers
   std::uint32_t answered_ = 0;
   double window_began_ = 0.0;                     ///< [s]
   std::array<double, 2> delays_{kNever, kNever};  ///< [s] of this window and of the last one

@@ -1,6 +1,24 @@
 #include "clients/haptic/answer_readers.h"
 
+#include <chrono>
+
+#include "idl/types/messages/contacts.h"
+
 namespace tenon::haptic {
+
+namespace {
+
+std::int64_t readerTimeNs() {
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+}  // namespace
+
+std::optional<double> AnswerReaders::takeLoss() {
+  const std::optional<double> slow = slow_loss_.take(), each_tick = loss_.take();
+  const bool of_slow = (slow_ && slow) || !each_tick;
+  return of_slow ? slow : each_tick;
+}
 
 Result<void> AnswerReaders::subscribe(bool slow) {
   wire::Inbox& inbox = link_.inbox();
@@ -15,11 +33,13 @@ Result<void> AnswerReaders::subscribe(bool slow) {
   std::size_t index = 0;
   for (wire::Partition& hand : link_.member().hands()) {
     if (!subscribed) break;
-    subscribed = inbox.on<HandManifold>(hand, slow ? wire::kHandManifold50 : wire::kHandManifold,
-                                        [this, slow, at = ++index](const HandManifold& manifold) {
-                                          hear(at, slow);
-                                          callbacks_.manifold(manifold);
-                                        });
+    subscribed = inbox.on<HandManifold>(
+        hand, slow ? wire::kHandManifold50 : wire::kHandManifold,
+        [this, slow, at = ++index](const HandManifold& manifold) {
+          hear(at, slow);
+          (slow ? slow_loss_ : loss_).received(manifold.hand, manifold.sent, readerTimeNs());
+          callbacks_.manifold(manifold);
+        });
   }
   return subscribed;
 }

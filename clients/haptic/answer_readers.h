@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <vector>
 
+#include "clients/haptic/answer_loss.h"
 #include "clients/haptic/station_link.h"
 
 namespace tenon::haptic {
@@ -33,6 +35,9 @@ class AnswerReaders {
   /// No others read: what has come since the last call of choose() was slow.
   [[nodiscard]] bool hasSlowAlone() const { return slow_ && !has_both_; }
 
+  /// [-] AnswerLoss of the manifolds since the last call, of the newest readers if it is known.
+  [[nodiscard]] std::optional<double> takeLoss();
+
   static constexpr int kMostCalls = 10;
 
  private:
@@ -53,6 +58,7 @@ class AnswerReaders {
   void close(bool slow);
 
   StationLink& link_;
+  AnswerLoss slow_loss_, loss_;  ///< of slow manifolds, and of those of each tick
   Callbacks callbacks_;
   bool slow_ = false;         ///< the newest readers
   bool has_both_ = false;     ///< the former ones are still open

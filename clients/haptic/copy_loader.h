@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <future>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -12,9 +13,10 @@
 namespace tenon::haptic {
 
 /// Gets the server's compiled scene for the force model `scene copy` of a station's hands: before the first
-/// step if that was asked for, else beside the session, once the link turns out to be long.
+/// step if that was asked for, else beside the session, once the link turns out to be long. Copies for the
+/// hands of a new seat are made likewise, since devices get no writes while a station restarts.
 ///
-/// Threads: one; loading has its own. Real-time: no.
+/// Threads: one, which gives the copies to the station; loading and making have their own. Real-time: no.
 class CopyLoader {
  public:
   /// `source` and `station` outlive this.
@@ -28,23 +30,30 @@ class CopyLoader {
                                          const std::atomic<bool>& stop);
   /// Once, where the station chooses for itself.
   void loadBeside(const std::string& scene_hash);
-  /// How loading ended, once it has.
+  /// Copies for the hands of a new seat, where there is a scene: before renew() returns, or by takeOutcome().
+  void renew();
+  void renewBeside();
+  /// How loading or making beside the session ended, once it has: the station has its copies.
   [[nodiscard]] std::optional<Result<void>> takeOutcome();
-  /// The hands have their copies.
-  [[nodiscard]] bool loaded() const noexcept { return loaded_; }
+  /// There is a scene to copy.
+  [[nodiscard]] bool loaded() const noexcept { return scene_ != nullptr; }
   /// Ends loading, if it runs.
   void cancel() noexcept { cancelled_ = true; }
 
  private:
-  Result<void> load(const std::string& scene_hash, const std::function<void(const std::string&)>& print,
-                    const std::atomic<bool>& stop);
+  struct Loaded {
+    std::shared_ptr<const simulation::Scene> scene;
+    SceneCopies copies;
+  };
+  void give(Loaded loaded);
 
   Station& station_;
   const SceneSource& source_;
   ForceModelWish wish_;
-  bool loaded_ = false, missing_ = false;
+  std::shared_ptr<const simulation::Scene> scene_;
+  bool missing_ = false;
   std::atomic<bool> cancelled_{false};
-  std::future<Result<void>> loading_;
+  std::future<Result<Loaded>> loading_;
 };
 
 }  // namespace tenon::haptic

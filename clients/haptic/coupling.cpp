@@ -26,7 +26,8 @@ Wrench Coupling::step(const LocalProxy& proxy, const Pose& X_WH, double dt) noex
   } else {
     stretch_rate_ = {};
   }
-  has_stretch_ = proxy.active;
+  // the filter of the rate would keep a NaN
+  has_stretch_ = proxy.active && stretch_.translation.allFinite() && stretch_.rotation.allFinite();
 
   stiffness_ = std::min(proxy.stiffness, options_.max_stiffness);
   rotational_stiffness_ = std::min(proxy.rotational_stiffness, options_.max_rotational_stiffness);

@@ -33,39 +33,27 @@ double DurationHistogram::quantile(double fraction) const noexcept {
   return count_ > 0 ? max() : 0.0;
 }
 
-void AnswerLoss::ReceivedTicks::add(Tick tick) noexcept {
-  if (count == 0) {
-    first = last = tick;
-  } else {
-    if (tick <= last) return;  // repeated or overtaken
-    period = std::min(period.value_or(tick - last), tick - last);
-    last = tick;
+void ReplacedAnswers::received(HandId hand, Tick tick, std::int64_t now_ns) noexcept {
+  auto found =
+      std::find_if(hands_.begin(), hands_.end(), [&](const Answers& one) { return one.hand == hand; });
+  if (found == hands_.end()) {
+    if (hands_.full()) return;
+    hands_.push_back({.hand = hand, .newest = tick, .cycle = now_ns, .received = 1});
+    return;
   }
-  ++count;
+  if (tick == found->newest) return;  // repeated
+  ++found->received;
+  if (tick < found->newest || now_ns == found->cycle) ++found->replaced;
+  if (tick < found->newest) return;
+  found->newest = tick;
+  found->cycle = now_ns;
 }
 
-double AnswerLoss::ReceivedTicks::lostShare() const noexcept {
-  if (!period) return 0.0;
-  const auto sent = static_cast<double>((last - first) / *period + 1);
-  return std::max(0.0, 1.0 - static_cast<double>(count) / sent);
-}
-
-void AnswerLoss::received(HandId hand, Tick tick) noexcept {
-  const auto found = std::find_if(hands_.begin(), hands_.end(), [&](const Answers& answers) {
-    return answers.all.count == 0 || answers.hand == hand;
-  });
-  if (found == hands_.end()) return;
-  found->hand = hand;
-  found->all.add(tick);
-  if (tick % kSlowTicks == 0) found->periodic.add(tick);
-}
-
-double AnswerLoss::share() const noexcept {
+double ReplacedAnswers::take() noexcept {
   double largest = 0.0;
-  for (const Answers& answers : hands_) {
-    // of slow answers more than every third is periodic
-    const bool is_slow = 3 * answers.periodic.count > answers.all.count;
-    largest = std::max(largest, (is_slow ? answers.periodic : answers.all).lostShare());
+  for (Answers& one : hands_) {
+    if (one.received > 0) largest = std::max(largest, static_cast<double>(one.replaced) / one.received);
+    one.received = one.replaced = 0;
   }
   return largest;
 }
@@ -78,7 +66,7 @@ void ForceAgeStatistics::inputSent(std::uint32_t seq, std::int64_t now_ns, std::
 
 void ForceAgeStatistics::answerReceived(HandId hand, Tick tick, std::uint32_t seq,
                                         std::int64_t now_ns) noexcept {
-  loss_.received(hand, tick);
+  replaced_.received(hand, tick, now_ns);
   // the manifolds of all hands answer the same input: only the first counts
   if (seq == 0 || seq <= newest_answer_) return;
   const Sent& sent = sent_[seq % kRing];
@@ -98,9 +86,8 @@ void ForceAgeStatistics::fill(Telemetry& telemetry) noexcept {
   telemetry.loop_late_p99 = lateness_.quantile(0.99);
   telemetry.age = recent_ages_.quantile(0.5);
   telemetry.jitter = std::max(0.0, recent_ages_.quantile(0.99) - recent_ages_.min());
-  telemetry.answers_lost = loss_.share();
+  telemetry.answers_replaced = replaced_.take();
   recent_ages_.clear();
-  loss_.clear();
   telemetry.longest_silence = static_cast<double>(longest_gap_) * 1e-9;
 }
 

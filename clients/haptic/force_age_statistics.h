@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "idl/types/fixed_vector.h"
 #include "idl/types/ids.h"
 #include "idl/types/messages/timing.h"
 
@@ -39,42 +40,30 @@ class DurationHistogram {
   std::int64_t min_ = std::numeric_limits<std::int64_t>::max();  // [ns]
 };
 
-/// Share of the server's answers to a station that are lost on the way.
-///
-/// The answers of a hand have ticks in steps of one (of ten for a tracked limb, which the smallest step
-/// within the window tells). Answers that the server did not send, because a newer one was ready, count as
-/// lost. Of slow answers the periodic ones count, each kSlowTicks; others are event-triggered.
+/// Share of a hand's answers that a newer one replaced before a cycle of the station used them: it came in
+/// the same cycle, or before them.
 ///
 /// Threads: one. Real-time: everything.
-class AnswerLoss {
+class ReplacedAnswers {
  public:
-  static constexpr Tick kSlowTicks = 20;  ///< [ticks]
-  void received(HandId hand, Tick tick) noexcept;
-  /// [-] since clear(), of the hand that lost most; 0 when there were fewer than two answers.
-  [[nodiscard]] double share() const noexcept;
-  void clear() noexcept { hands_ = {}; }
+  /// The answer of a tick, in the cycle that began at `now_ns`.
+  void received(HandId hand, Tick tick, std::int64_t now_ns) noexcept;
+  /// [-] since the last call, of the hand with the largest; 0 without answers.
+  [[nodiscard]] double take() noexcept;
 
  private:
-  static constexpr std::size_t kHands = 8;
-  /// The ticks of answers that come at a fixed period.
-  struct ReceivedTicks {
-    Tick first = 0, last = 0;
-    std::optional<Tick> period;  // [ticks] smallest step so far
-    std::uint64_t count = 0;
-
-    void add(Tick tick) noexcept;
-    [[nodiscard]] double lostShare() const noexcept;
-  };
   struct Answers {
     HandId hand;
-    ReceivedTicks all, periodic;
+    Tick newest = 0;
+    std::int64_t cycle = 0;  ///< [ns] of the newest
+    std::uint32_t received = 0, replaced = 0;
   };
-  std::array<Answers, kHands> hands_{};
+  FixedVector<Answers, 8> hands_;
 };
 
 /// Latency statistics of a station: time from a device reading to the server's contacts computed from it (age
-/// of the rendered force), its jitter, the longest time between two such answers, answers lost, and lateness
-/// of the servo loop.
+/// of the rendered force), its jitter, the longest time between two such answers, answers that were replaced,
+/// and lateness of the servo loop.
 ///
 /// Threads: one. Real-time: everything.
 class ForceAgeStatistics {
@@ -98,7 +87,7 @@ class ForceAgeStatistics {
   DurationHistogram ages_;
   DurationHistogram recent_ages_;  // since the last fill()
   DurationHistogram lateness_;
-  AnswerLoss loss_;  // since the last fill()
+  ReplacedAnswers replaced_;  // since the last fill()
   std::uint32_t newest_answer_ = 0;
   std::optional<std::int64_t> answered_at_;  // [ns] of newest_answer_
   std::int64_t longest_gap_ = 0;             // [ns] between two answers

@@ -12,6 +12,8 @@ namespace {
 constexpr double kDampingFraction = 0.2;  // [-]
 // A cycle of no time, or of none that is known, counts as this.
 constexpr double kShortestCycle = 1e-6;  // [s]
+// A longer one, as of a machine that stood still, counts as this for the age of a device's reading.
+constexpr double kLongestCycle = 0.01;  // [s]
 // Gap at which the server reports contact, rounding included.
 constexpr float kContactGap = 5e-5F;  // [m]
 
@@ -58,20 +60,22 @@ HandStiffness stiffnessOf(const devices::DeviceCaps& caps) noexcept {
   return {limits.stiffness, limits.rotational_stiffness};
 }
 
-HapticHand::HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch)
-    : device_(device),
+HapticHand::HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch,
+                       const devices::MotorThermalModel& heat)
+    : GuardedDevice(device, clutch),
       workspace_(workspaceOf(device.caps())),
       coupling_(couplingOf(device.caps())),
-      fixture_(fixtureLimitsOf(device.caps())),
-      safety_(device.caps(), clutch) {}
+      switch_slew_(devices::safetyLimits(device.caps())),
+      fixture_(fixtureLimitsOf(device.caps())) {
+  safety_.setHeat(heat);
+}
 
 void HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed) {
-  permitted_ = armed;
-  finishing_ = false;
+  GuardedDevice::begin(armed, device_state_);
+  stopped_ = false;
   finish_time_ = 0.0;
-  if (!armed) device_.disarm();
-  device_.read(device_state_);
-  if (armed && !device_state_.forces_on) handover_.askWithoutReset();
+  reading_age_ = 0.0;
+  readings_lost_ = false;
   workspace_.setCentre(p_WH - device_state_.X_DH.translation());
   input_ = {};
   input_.hand = hand;
@@ -86,27 +90,20 @@ void HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH, bool a
 }
 
 void HapticHand::permitForces(bool permitted) noexcept {
-  const bool runs = permitted_ && device_state_.forces_on && !safety_.wantsDisarm();
-  permitted_ = permitted;
-  if (!permitted) handover_.withdraw();
-  if (!permitted || runs || finishing_) return;
-  safety_.reset();
+  stopped_ = !permitted;
+  if (!permit(permitted, device_state_.forces_on)) return;
   coupling_.reset();
-  handover_.ask();
-}
-
-void HapticHand::finish(bool disarms) noexcept {
-  finishing_ = true;
-  finish_disarms_ = disarms;
-  if (disarms) handover_.withdraw();
+  reading_age_ = 0.0;
+  readings_lost_ = false;
 }
 
 void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noexcept {
   if (!(dt > 0.0)) dt = kShortestCycle;
   if (finishing_) finish_time_ += dt;
   takeScene();
-  readDevice();
+  readDevice(dt);
   answers_.step(seq, local_.hasManifold() ? local_.manifold().answers_seq : 0, dt);
+  fresh_ = backoff_.step(excess() <= safety_.limits().fade_from, dt);
   moveWorkspace(dt);
   if (!declutched_) anchor(seq, world);
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
@@ -129,8 +126,7 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
 
 void HapticHand::stepModels(const Pose& X_WH, const WorldView& world) noexcept {
   local_.step(X_WH, world);
-  const bool use_copy =
-      copy_ && wanted_model_ == ForceModelKind::kSceneCopy && rendering_ == Rendering::kOn && copy_->ready();
+  const bool use_copy = rendersCopy();
   if (use_copy) copy_->step(X_WH, world);
   const ForceModelKind kind = use_copy ? ForceModelKind::kSceneCopy : ForceModelKind::kManifold;
   if (kind == model_kind_) return;
@@ -140,8 +136,32 @@ void HapticHand::stepModels(const Pose& X_WH, const WorldView& world) noexcept {
   switch_slew_.begin();
 }
 
-void HapticHand::readDevice() noexcept {
-  if (!handover_.pending()) return device_.read(device_state_);
+bool HapticHand::rendersCopy() const noexcept {
+  if (!copy_) return false;
+  if (rendering_ == Rendering::kOn) return wanted_model_ == ForceModelKind::kSceneCopy && copy_->ready();
+  // in a gap the other model's contacts may be those of another place
+  const bool ages =
+      excess() > safety_.limits().fade_from && local_.proxy().active && !local_.proxy().discontinuous;
+  return model_kind_ == ForceModelKind::kSceneCopy && ages;
+}
+
+void HapticHand::checkReading(std::uint64_t seq_before, double dt) noexcept {
+  const bool is_new = device_state_.seq != seq_before;
+  reading_age_ = is_new ? 0.0 : reading_age_ + std::min(dt, kLongestCycle);
+  if (reading_age_ > safety_.limits().fade_from) device_state_.V_DH = {};
+  readings_lost_ = readings_lost_ || reading_age_ > safety_.limits().stale_at;
+  if (!readings_lost_) return;
+  device_state_.forces_on = false;
+  if (device_state_.fault == devices::DeviceFault::kNone)
+    device_state_.fault = devices::DeviceFault::kCommunication;
+}
+
+void HapticHand::readDevice(double dt) noexcept {
+  if (!handover_.pending()) {
+    const std::uint64_t seq_before = device_state_.seq;
+    device_.read(device_state_);
+    return checkReading(seq_before, dt);
+  }
   device_state_.forces_on = false;
   device_state_.V_DH = {};
   // the person has looked at it: what it said before does not latch the clutch again
@@ -168,8 +188,16 @@ bool HapticHand::deadManHeld() const noexcept {
 }
 
 void HapticHand::anchor(std::uint32_t seq, const WorldView& world) noexcept {
-  const bool usable = answers_.excess() <= safety_.limits().fade_from && permitted_ && safety_.forcesOn() &&
-                      local_.usable(world);
+  if (answers_.isTooLong()) {
+    const bool permitted = reading_age_ <= safety_.limits().fade_from && permitted_ && safety_.forcesOn() &&
+                           local_.usable(world);
+    // what contacts exert leaves by an interruption
+    const bool is_out = rendering_ == Rendering::kInterrupted || rendering_ == Rendering::kGuidanceAlone;
+    rendering_ = permitted && is_out ? Rendering::kGuidanceAlone : Rendering::kInterrupted;
+    return;
+  }
+  if (rendering_ == Rendering::kGuidanceAlone) rendering_ = Rendering::kInterrupted;
+  const bool usable = fresh_ && permitted_ && safety_.forcesOn() && local_.usable(world);
   const bool jumped = local_.jumped() || model().jumped();
   if (!usable || (jumped && rendering_ == Rendering::kOn)) rendering_ = Rendering::kInterrupted;
   if (!usable || rendering_ == Rendering::kOn) return;
@@ -187,24 +215,34 @@ void HapticHand::anchor(std::uint32_t seq, const WorldView& world) noexcept {
 
 devices::SafetyRequest HapticHand::request(const Pose& X_WH, double dt) noexcept {
   const LocalProxy& proxy = model().proxy();
-  const double excess = answers_.excess();
+  const double age = excess();
+  const bool guides_alone = rendering_ == Rendering::kGuidanceAlone;
+  const bool renders = rendering_ == Rendering::kOn || guides_alone;
   devices::SafetyRequest request;
-  // springs in parallel
-  const Wrench F_Ho_W = switch_slew_.step(coupling_.step(proxy, X_WH, dt), dt);
-  request.requested.F_Ho_D = F_Ho_W + fixture_.step(X_WH, dt, rendering_ == Rendering::kOn && !finishing_);
-  request.stiffness = coupling_.stiffness() + fixture_.stiffness();
-  request.rotational_stiffness = coupling_.rotationalStiffness() + fixture_.rotationalStiffness();
-  // without contacts to render there is no force that could be old
-  request.age = proxy.active ? excess : 0.0;
+  request.requested.F_Ho_D = fixture_.step(X_WH, dt, renders && !finishing_);
+  request.stiffness = fixture_.stiffness();
+  request.rotational_stiffness = fixture_.rotationalStiffness();
+  if (guides_alone) {
+    coupling_.reset();
+    request.age = reading_age_;
+  } else {  // springs in parallel
+    const Wrench F_Ho_W = switch_slew_.step(coupling_.step(proxy, X_WH, dt), dt);
+    request.requested.F_Ho_D = F_Ho_W + request.requested.F_Ho_D;
+    request.stiffness += coupling_.stiffness();
+    request.rotational_stiffness += coupling_.rotationalStiffness();
+    // without contacts to render there is no force that could be old
+    request.age = proxy.active ? age : reading_age_;
+  }
   // while they only get older the force fades; after a jump, and once they are fresh again, it is another one
-  request.restart = finishing_ || (rendering_ != Rendering::kOn && (!proxy.active || proxy.discontinuous ||
-                                                                    excess <= safety_.limits().fade_from));
+  request.restart = finishing_ || (!renders && (!proxy.active || proxy.discontinuous ||
+                                                answers_.isTooLong() || age <= safety_.limits().fade_from));
   request.dead_man_held = deadManHeld();
   if (request.restart || !request.dead_man_held || !safety_.forcesOn()) {
     fixture_.restart();
     switch_slew_.reset();
   }
-  request.emergency_stop = !permitted_;
+  request.armed = permitted_ || stopped_;
+  request.emergency_stop = stopped_;
   return request;
 }
 
@@ -213,8 +251,7 @@ void HapticHand::writeDevice(const devices::DeviceCommand& command) noexcept {
   const LocalProxy& proxy = model().proxy();
   device_.show({proxy.active, in_contact_, workspace_.toDevice(proxy.X_WS), workspace_.toDevice(proxy.X_WO),
                 workspace_.centre(), local_.hasManifold() ? local_.manifold().object : ObjectId{}});
-  device_.write(command);  // a stop brakes before the forces are off
-  if (safety_.wantsDisarm() || (finished() && finish_disarms_)) device_.disarm();
+  write(command, finished());
 }
 
 /// The last sample becomes the first of the earlier ones of input `seq`.
@@ -261,9 +298,13 @@ void HapticHand::updateEvents() noexcept {
   beyond_count_ = model().beyondValidity();
   events_.beyond_validity_began = beyond && !beyond_validity_;
   beyond_validity_ = beyond;
-  const bool stale = local_.hasManifold() && answers_.excess() > safety_.limits().fade_from;
+  const bool stale =
+      local_.hasManifold() && answers_.excess() > safety_.limits().fade_from && !answers_.isTooLong();
   events_.stale_began = stale && !stale_;
   stale_ = stale;
+  events_.guidance_alone_began = answers_.isTooLong() && !guidance_alone_;
+  events_.guidance_alone_ended = !answers_.isTooLong() && guidance_alone_;
+  guidance_alone_ = answers_.isTooLong();
   events_.guidance_began = fixture_.acts() && !guided_;
   events_.guidance_ended = !fixture_.acts() && guided_;
   guided_ = fixture_.acts();

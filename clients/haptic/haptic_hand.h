@@ -1,13 +1,15 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
 
 #include "clients/haptic/answer_age.h"
 #include "clients/haptic/coupling.h"
-#include "clients/haptic/device_handover.h"
 #include "clients/haptic/force_model.h"
+#include "clients/haptic/gap_backoff.h"
+#include "clients/haptic/guarded_device.h"
 #include "clients/haptic/local_model.h"
 #include "clients/haptic/scene_copy.h"
 #include "clients/haptic/switch_slew.h"
@@ -31,6 +33,8 @@ struct HandEvents {
   bool indexing_began = false;
   bool indexing_ended = false;
   bool stale_began = false;
+  bool guidance_alone_began = false;  ///< the link is too long for contacts (AnswerAge::isTooLong)
+  bool guidance_alone_ended = false;
   bool beyond_validity_began = false;
   bool guidance_began = false;
   bool guidance_ended = false;
@@ -41,23 +45,32 @@ struct HandEvents {
 /// server (input) and to the other participants (state).
 ///
 /// Every force passes the safety layer (devices/safety.h), that of a virtual fixture together with that of
-/// the contacts, and only while these are rendered.
+/// the contacts, and only while these are rendered; or alone, over a link that is too long for contacts
+/// (AnswerAge::isTooLong), since it needs no answer of the server: the age of its messages is its own bound.
 ///
 /// A force that was interrupted returns from zero: after a gap (the contacts are older than the layer's fresh
 /// limit), a freeze, a refusal, a jump of a body, an arming or a stop. First the hand is re-anchored: the
 /// workspace shifts until hand and server's proxy coincide, which the server has to answer; then the soft
-/// start of the layer ramps the force. So no stretch of position that came about while nobody looked is
-/// displayed, and nothing in the scene jumps; one of rotation stays, and its torque ramps.
+/// start of the layer ramps the force. So nothing in the scene jumps, and no translational coupling error
+/// accumulated in the gap is rendered; a rotational error remains and its torque is ramped. After gaps in
+/// quick succession it waits (GapBackoff).
+///
+/// A device whose readings stop, and which says nothing, ages like contacts: the force fades with the age of
+/// the last reading, and from SafetyLimits::stale_at on it has lost its communication, a fault until its
+/// person presses.
 ///
 /// While the person holds a button that de-clutches (DeviceCaps::declutch) the hand keeps its place in the
 /// scene and the device moves alone, without force; its release ends a gap.
 ///
-/// Threads: one; armDevice and setScene by others, beside it. Real-time: step, receive, permitForces.
-class HapticHand {
+/// Threads: as GuardedDevice; setCopy by another one, beside it. Real-time: step, receive, permitForces, and
+/// as GuardedDevice.
+class HapticHand : public GuardedDevice {
  public:
   /// Parameters of workspace and coupling come from the device's capabilities. `device` and `clutch` outlive
-  /// the hand; `clutch` is shared by the arms of a bimanual device, null for a single device.
-  explicit HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch = nullptr);
+  /// the hand; `clutch` is shared by the arms of a bimanual device, null for a single device. `heat`: what
+  /// the device's last hand left.
+  explicit HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch = nullptr,
+                      const devices::MotorThermalModel& heat = {});
 
   /// Places the workspace so that the hand is at p_WH now. Not `armed`, the device is disarmed; else one that
   /// has no forces on is to be armed by armDevice(), unless it is in fault.
@@ -71,16 +84,12 @@ class HapticHand {
   /// One cycle of `dt` [s], the time since the last one by the clock of the caller; `seq` numbers the input.
   void step(std::uint32_t seq, const WorldView& world, double dt) noexcept;
   ~HapticHand() { delete offered_.load(); }
-  HapticHand(const HapticHand&) = delete;
-  HapticHand& operator=(const HapticHand&) = delete;
 
-  /// The compiled scene of the server, for the force model `scene copy`: once. Allocates; by any thread,
-  /// beside step().
-  void setScene(const std::shared_ptr<const simulation::Scene>& scene) {
-    if (scene) delete offered_.exchange(std::make_unique<SceneCopy>(scene).release());
-  }
+  /// For the force model `scene copy`: once. By any thread, beside step().
+  void setCopy(std::unique_ptr<SceneCopy> copy) { delete offered_.exchange(copy.release()); }
   /// From the next cycles on; `manifold` at first. A copy of the scene is used as far as there is one, and
-  /// once it has contacts. Forces of the two are blended (SwitchSlew).
+  /// once it has contacts. Between the two the force changes as SwitchSlew says. In a gap the model that
+  /// rendered continues from its last contacts.
   void setForceModel(ForceModelKind kind) noexcept { wanted_model_ = kind; }
   /// That the force is of now.
   [[nodiscard]] ForceModelKind forceModel() const noexcept { return model_kind_; }
@@ -90,22 +99,12 @@ class HapticHand {
   void setLinkJitter(double jitter) noexcept { answers_.setJitter(jitter); }
   /// ServerTime::setRoundTrip, `round_trip` [s].
   void setLinkRoundTrip(double round_trip) noexcept { time_.setRoundTrip(round_trip); }
-  /// False: forces off, brake on, input inactive. True, for the person at the device, also of a device in
+  /// False, a stop: forces off, brake on, input inactive. True, for the person at the device, also of one in
   /// fault: resets the safety layer, and asks for armDevice() if the device is not armed. See Arming, which
   /// decides it.
   void permitForces(bool permitted) noexcept;
-  /// Whether begin() or permitForces() asked for armDevice().
-  [[nodiscard]] bool wantsArming() const noexcept { return handover_.pending(); }
-  /// Does what was asked for, resets and arms the device; may block. The loop has the device again
-  /// after handBack(), which follows armDevice() of all hands that share its clutch.
-  Result<void> armDevice() { return handover_.serve(device_); }
-  void handBack() noexcept { handover_.handBack(); }
-  /// With the next steps the force falls to zero, within kFinishTime; then the device displays none, and with
-  /// `disarms` it is disarmed. Nothing ends that but a new begin().
-  void finish(bool disarms) noexcept;
+  /// The force is zero: kFinishTime after finish().
   [[nodiscard]] bool finished() const noexcept { return finishing_ && finish_time_ >= kFinishTime; }
-  /// Forces off.
-  void end() noexcept { device_.disarm(); }
 
   [[nodiscard]] HandId id() const noexcept { return input_.hand; }
   [[nodiscard]] const DeviceInput& input() const noexcept { return input_; }
@@ -124,24 +123,33 @@ class HapticHand {
     const bool off = device_state_.fault != devices::DeviceFault::kNone || safety_.wantsDisarm();
     return permitted_ && off && !handover_.pending();
   }
+  [[nodiscard]] const devices::MotorThermalModel& heat() const noexcept { return safety_.heat(); }
   /// [s] age of the contacts that are rendered, on the clock of step(); infinite without any.
   [[nodiscard]] double contactAge() const noexcept { return answers_.age(); }
+  /// [s] of the link, one way: half of AnswerAge::delay().
+  [[nodiscard]] double linkDelay() const noexcept { return 0.5 * answers_.delay(); }
 
  private:
   static constexpr double kFinishTime = 0.025;  ///< [s] the safety layer takes 20 ms
-  /// How the hand's force stands to its contacts.
+  /// Rendering state of the contacts.
   enum class Rendering {
     kInterrupted,  ///< they are not to be rendered, or not yet
     kAnchoring,    ///< the server has not yet answered the re-anchored hand
     kOn,
+    kGuidanceAlone,  ///< the link is too long for them; a virtual fixture is displayed
   };
-  void readDevice() noexcept;
+  /// `dt` [s].
+  void readDevice(double dt) noexcept;
+  /// A fault of a device that has not had a new reading for too long. `dt` [s].
+  void checkReading(std::uint64_t seq_before, double dt) noexcept;
   /// `dt` [s].
   void moveWorkspace(double dt) noexcept;
   /// Decides rendering_ before the models' step, and re-anchors the hand.
   void anchor(std::uint32_t seq, const WorldView& world) noexcept;
   void stepModels(const Pose& X_WH, const WorldView& world) noexcept;
-  /// What setScene() made; a first one only, since to free another would take time.
+  /// The force is of the copy in this cycle. After the local model's step.
+  [[nodiscard]] bool rendersCopy() const noexcept;
+  /// What setCopy() was given; a first one only, since to free another would take time.
   void takeScene() noexcept {
     if (!copy_ && offered_.load(std::memory_order_relaxed) != nullptr)
       copy_.reset(offered_.exchange(nullptr));
@@ -153,12 +161,13 @@ class HapticHand {
   /// `dt` [s].
   [[nodiscard]] devices::SafetyRequest request(const Pose& X_WH, double dt) noexcept;
   void writeDevice(const devices::DeviceCommand& command) noexcept;
+  /// [s] of contacts, beyond what their link explains, or of the device's reading, whichever is older.
+  [[nodiscard]] double excess() const noexcept { return std::max(answers_.excess(), reading_age_); }
   [[nodiscard]] bool deadManHeld() const noexcept;
   void keepSample(std::uint32_t seq) noexcept;
   void updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept;
   void updateEvents() noexcept;
 
-  devices::HapticDevice& device_;
   Workspace workspace_;
   LocalModel local_;  ///< has the server's newest manifold, whichever model the force is of
   ServerTime time_;
@@ -167,12 +176,14 @@ class HapticHand {
   Coupling coupling_;
   SwitchSlew switch_slew_;
   VirtualFixture fixture_;
-  devices::Safety safety_;
   AnswerAge answers_;
-  DeviceHandover handover_;
+  GapBackoff backoff_;
+  bool fresh_ = false;  // the contacts are no gap, and have been none for long enough
   Rendering rendering_ = Rendering::kInterrupted;
   std::uint32_t anchored_seq_ = 0;  // first input of the re-anchored hand
   devices::DeviceState device_state_;
+  double reading_age_ = 0.0;    ///< [s] since there was a new one
+  bool readings_lost_ = false;  ///< latched, until the person presses
   DeviceInput input_;
   HandState state_;
   HandEvents events_;
@@ -182,12 +193,11 @@ class HapticHand {
   bool fault_ = false;
   bool beyond_validity_ = false;
   bool stale_ = false;
+  bool guidance_alone_ = false;  // as told by events_
   bool in_contact_ = false;
   bool guided_ = false;
   bool declutched_ = false;
-  bool permitted_ = true;
-  bool finishing_ = false;
-  bool finish_disarms_ = false;
+  bool stopped_ = false;      // permitForces() took the permission
   double finish_time_ = 0.0;  // [s] since finish()
 };
 

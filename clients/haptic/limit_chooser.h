@@ -15,8 +15,8 @@ struct LinkMeasurement {
   double trip_jitter = 0.0;  ///< [s] of the round trip: 90th percentile less the shortest
   double age_jitter = 0.0;   ///< [s] of the contacts: 99th percentile less the youngest
   double inputs_lost = 0.0;  ///< [-]
-  /// [-] where answers are slow; none, not known, at 1 kHz, where those count that a newer one has overtaken,
-  /// and where fewer than two came
+  /// [-] where answers are slow; none, not known, at 1 kHz, where DDS discards those that a newer one has
+  /// overtaken, and where fewer than two were due
   std::optional<double> answers_lost;
   std::uint32_t input_period = 1;  ///< [ticks] DeviceInput::period
 };

@@ -26,24 +26,23 @@ void LinkAdaptation::askClock() {
   if (clock_.ask(link_.welcome().client, nowNs(), request)) static_cast<void>(link_.send(request));
 }
 
-/// [-] since the last Telemetry; none: not known.
-std::optional<double> LinkAdaptation::answersLost(const Telemetry& telemetry, bool slow_answers) {
-  const std::uint64_t answers = telemetry.samples - std::exchange(answers_counted_, telemetry.samples);
-  if (!slow_answers || answers < 2) return std::nullopt;
-  return telemetry.answers_lost;
+/// Of the last second; a servo loop that is new counts from 0.
+std::uint64_t LinkAdaptation::lateCycles(const Telemetry& telemetry) {
+  const std::uint64_t counted = std::exchange(late_cycles_counted_, telemetry.loop_overruns);
+  return telemetry.loop_overruns - (counted <= telemetry.loop_overruns ? counted : 0);
 }
 
-void LinkAdaptation::measure(Telemetry& telemetry, bool slow_answers) {
+void LinkAdaptation::measure(Telemetry& telemetry, std::optional<double> slow_lost) {
   clock_.fill(telemetry, nowNs());
   choice_ = limits_.step({.input_gap = telemetry.input_gap,
                           .trip_jitter = telemetry.trip_jitter,
                           .age_jitter = telemetry.jitter,
                           .inputs_lost = telemetry.inputs_lost,
-                          .answers_lost = answersLost(telemetry, slow_answers),
+                          .answers_lost = slow_lost,
                           .input_period = rates_.inputPeriod(1)});
   telemetry.limits = choice_.limits;
   telemetry.playout_ticks = choice_.playout_ticks;
-  late_cycles_ = telemetry.loop_overruns - std::exchange(late_cycles_counted_, telemetry.loop_overruns);
+  late_cycles_ = lateCycles(telemetry);
   round_trip_ = telemetry.clock_known ? std::optional(telemetry.round_trip) : std::nullopt;
 }
 

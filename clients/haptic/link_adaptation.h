@@ -28,13 +28,16 @@ class LinkAdaptation {
   /// `inputs` samples of DeviceInput were sent in step `seq` of the station.
   void sent(std::uint32_t seq, std::uint32_t inputs) noexcept { clock_.sent(seq, inputs); }
   /// The server or the seat was gone for a while.
-  void interrupted() noexcept { limits_.interrupted(); }
+  void interrupted() noexcept {
+    limits_.interrupted();
+    clock_.interrupted();
+  }
   /// The server is another process, maybe on another machine.
   void resetClock() { clock_ = {}; }
 
   /// Completes the statistics of the last second by what is measured here, and chooses the limits that they
-  /// ask for. `slow_answers`: all answers of this second were slow ones.
-  void measure(Telemetry& telemetry, bool slow_answers);
+  /// ask for. `slow_lost` [-] of the answers, where all of this second were slow ones; none: not known.
+  void measure(Telemetry& telemetry, std::optional<double> slow_lost);
   /// After measure(), and in lockstep once: `has_scene`: the station has the compiled scene.
   ForceModelKind chooseModel(bool has_scene) {
     return model_ = models_.step(round_trip_, has_scene, late_cycles_);
@@ -59,7 +62,7 @@ class LinkAdaptation {
   }
 
  private:
-  [[nodiscard]] std::optional<double> answersLost(const Telemetry& telemetry, bool slow_answers);
+  [[nodiscard]] std::uint64_t lateCycles(const Telemetry& telemetry);
 
   StationLink& link_;
   LinkClock clock_;
@@ -72,7 +75,6 @@ class LinkAdaptation {
   std::optional<double> round_trip_;       ///< [s]
   std::uint64_t late_cycles_ = 0;          ///< of the last second
   std::uint64_t late_cycles_counted_ = 0;  ///< as the last Telemetry has them
-  std::uint64_t answers_counted_ = 0;      ///< likewise
 };
 
 }  // namespace tenon::haptic

@@ -26,7 +26,8 @@ void LinkClock::receive(const ClockSync& answer, std::int64_t now_ns) noexcept {
   if (answer.newest_seq == 0 || newest.seq != answer.newest_seq) return;
   const bool is_another =
       since_ && (newest.seq < since_->seq || answer.inputs_received < answer_since_.inputs_received);
-  if (!since_ || is_another) {  // the first answer, or one of another server or seat
+  // the first answer, one of another server or seat, or as long as it tells of an interruption
+  if (!since_ || is_another || answer.longest_gap > kInterruption) {
     since_ = newest;
     answer_since_ = answer;
     return;

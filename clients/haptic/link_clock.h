@@ -20,6 +20,8 @@ class LinkClock {
   void sent(std::uint32_t seq, std::uint32_t inputs) noexcept;
   /// An answer of the server, at `now_ns`.
   void receive(const ClockSync& answer, std::int64_t now_ns) noexcept;
+  /// The server or the seat was gone for a while: inputs of that while are no loss of the link.
+  void interrupted() noexcept { since_.reset(); }
   /// Whether the loss of inputs has been counted once.
   [[nodiscard]] bool lossKnown() const noexcept { return loss_known_; }
   /// Sets the fields of `telemetry` that are measured here.
@@ -32,6 +34,9 @@ class LinkClock {
   // inputs between two statements of their loss: a thousandth shows
   static constexpr std::uint32_t kInputs = 2000;
   static constexpr std::uint32_t kFirstInputs = 400;  // until the first one: rates follow from it
+
+  // a longer time between two inputs at the server is an interruption
+  static constexpr double kInterruption = 0.3;  // [s]
 
   static constexpr std::size_t kRing = 16384;
   struct Sent {

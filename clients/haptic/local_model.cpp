@@ -22,8 +22,8 @@ constexpr double kFadeTicks = 20.0;  // [ticks]
 // After that manifolds of each tick have a gap.
 constexpr double kLate = 1.5 * kTickSeconds;  // [s]
 
-// What is told to move faster than a hand does was displaced within one tick, and does not go on. [m/s]
-constexpr double kFast = 1.0;
+// Velocities above this are single-tick displacements and are not extrapolated.
+constexpr double kFast = 1.0;  // [m/s]
 
 /// [m] Of a contact's point of the other body, from its pose of tick `heard_at` to `now`. Slow motion is that
 /// of what gives way to this hand.
@@ -107,6 +107,7 @@ const LocalProxy& LocalModel::step(const Pose& X_WH, const WorldView& world) noe
   late_ = false;
   proxy_.discontinuous = false;
   proxy_.active = usable(world);
+  stepped_tick_ = manifold_.tick;
   if (!proxy_.active) {
     proxy_.discontinuous = was_active;
     proxy_.touching = false;
@@ -176,14 +177,39 @@ void LocalModel::moveOtherSprings() noexcept {
   other_springs_.resize(kept);
 }
 
+/// A body that is not listed may have jumped in a frame that is still to come: then it is not where the
+/// manifold had it, beyond what its velocity explains.
+bool LocalModel::isElsewhere(const ManifoldContact& contact, const WorldView& world) const noexcept {
+  const bool listed = std::any_of(manifold_.bodies.begin(), manifold_.bodies.end(),
+                                  [&](const ManifoldBody& body) { return body.object == contact.other; });
+  if (listed || !world.contains(contact.other)) return false;
+  const ObservedObject& other = world.object(contact.other);
+  if (other.updated_at > manifold_.tick) return false;
+  const double since = static_cast<double>(manifold_.tick - other.updated_at) * kTickSeconds;
+  const double explained =
+      kFarthestExpectation + contact.velocity_W.cast<double>().norm() * std::min(since, kLongestExpectation);
+  const Vector3 p_WP = manifold_.X_WO * contact.p_BoP_B.cast<double>();
+  const double gap =
+      contact.normal_A.cast<double>().dot(other.X_WO.inverse() * p_WP) - static_cast<double>(contact.offset);
+  return !(std::abs(gap - static_cast<double>(contact.gap)) <= explained);
+}
+
 bool LocalModel::outdated(const WorldView& world) const noexcept {
   if (world.serverEpoch() != manifold_.server_epoch) return false;
   if (world.contains(manifold_.object) && world.object(manifold_.object).epoch > manifold_.object_epoch)
     return true;
   // the planes of a body fit the poses of its own epoch alone, so a frame that is still to come is awaited
-  return std::any_of(manifold_.bodies.begin(), manifold_.bodies.end(), [&](const ManifoldBody& body) {
-    return world.contains(body.object) && world.object(body.object).epoch != body.epoch;
-  });
+  const bool differs =
+      std::any_of(manifold_.bodies.begin(), manifold_.bodies.end(), [&](const ManifoldBody& body) {
+        return world.contains(body.object) && world.object(body.object).epoch != body.epoch;
+      });
+  // of bodies that are not listed, or were not before, the frames alone tell that they have jumped
+  return differs || std::any_of(manifold_.contacts.begin(), manifold_.contacts.end(),
+                                [&](const ManifoldContact& contact) {
+                                  return isElsewhere(contact, world) ||
+                                         (world.contains(contact.other) &&
+                                          world.object(contact.other).jumped_at > stepped_tick_);
+                                });
 }
 
 void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {

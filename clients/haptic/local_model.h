@@ -35,8 +35,7 @@ class LocalModel final : public ForceModel {
   [[nodiscard]] bool usable(const WorldView& world) const noexcept;
   /// The newest manifold is not a continuation of the one before: another object, or a jump of a body.
   [[nodiscard]] bool jumped() const noexcept override { return jumped_; }
-  /// [s] A part that gives way to the hand is heard late, so on long links to expect its motion makes it
-  /// swing.
+  /// [s] Longest extrapolation of other bodies; longer ones oscillate on long links.
   static constexpr double kLongestExpectation = 0.02;
   static constexpr double kFarthestExpectation =
       0.002;  ///< [m] by which a contact's plane is off if it stops
@@ -72,6 +71,7 @@ class LocalModel final : public ForceModel {
   /// `after_gap`: the manifolds of ticks before it did not come.
   void updateOtherSprings(bool same_object, bool after_gap) noexcept;
   void moveOtherSprings() noexcept;
+  [[nodiscard]] bool isElsewhere(const ManifoldContact& contact, const WorldView& world) const noexcept;
   [[nodiscard]] bool outdated(const WorldView& world) const noexcept;
   void solve(const Pose& X_WH, const WorldView& world) noexcept;
   void updateValidityCount() noexcept;
@@ -84,6 +84,7 @@ class LocalModel final : public ForceModel {
   FixedVector<collision::ContactConstraint, kManifoldContacts> constraints_;
   std::array<double, kManifoldContacts> multipliers_{};  ///< [N] of each constraint
   std::uint64_t beyond_validity_ = 0;
+  Tick stepped_tick_ = 0;      ///< of the manifold at the last step
   double now_ = 0.0;           ///< [ticks] of the server
   double manifold_age_ = 0.0;  ///< [s] since it was received
   bool has_manifold_ = false;

@@ -4,11 +4,34 @@
 #include <cstdint>
 #include <cstdlib>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "clients/haptic/station.h"
 
 namespace tenon::haptic {
+
+/// The hands of a station at which contacts are not felt, since its link is too long (kGuidanceAlone). The
+/// link is that of all hands: it is told as too long with the first one, as short enough with the last one.
+///
+/// Threads: one. Real-time: no.
+class FarHands {
+ public:
+  /// Whether `event` is to be told; all of other kinds are.
+  [[nodiscard]] bool passes(const StationEvent& event) {
+    if (event.kind == StationEventKind::kGuidanceAlone)
+      return hands_.insert(event.hand).second && hands_.size() == 1;
+    if (event.kind == StationEventKind::kContactsAgain)
+      return hands_.erase(event.hand) == 1 && hands_.empty();
+    return true;
+  }
+  /// The hands are others.
+  void clear() { hands_.clear(); }
+  [[nodiscard]] bool any() const { return !hands_.empty(); }
+
+ private:
+  std::set<HandId> hands_;
+};
 
 /// Events of a station that may happen many times a second: of each kind and hand at most one a second is
 /// sent, with the number of times. The first one passes at once. All others pass always.

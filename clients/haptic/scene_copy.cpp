@@ -364,7 +364,7 @@ void SceneCopy::mirrorPull(const HandPull& pull, double ahead) noexcept {
   other.stiffness = {pull.stiffness, pull.rotational_stiffness};
   other.weight = std::min(1.0, other.weight + kTickSeconds / kPullFade);
   if (!is_own && other.weight < 1.0) {
-    // as much nearer as the coupling is stiffer: its force on the object is that of the listed one
+    // goal displacement scaled by the weight, stiffness by 1/weight: the force equals the listed one
     const Displacement way = displacement(other.X_WO_begun, X_WG, object.p_OQ_O);
     X_WG = displaced(other.X_WO_begun, {other.weight * way.translation, other.weight * way.rotation},
                      object.p_OQ_O);
@@ -436,6 +436,13 @@ void SceneCopy::compareWithServer(const HandManifold& heard, std::uint32_t seq) 
       comparable && maxPointMotion(displacement(then.X_WO, heard.X_WO, held.p_OQ_O), held.radius) > kApart;
   apart_ = apart ? apart_ + 1 : 0;
   if (apart_ > kApartFor) diverged_ = true;
+}
+
+std::vector<std::unique_ptr<SceneCopy>> copiesOf(const std::shared_ptr<const simulation::Scene>& scene,
+                                                 std::size_t count) {
+  std::vector<std::unique_ptr<SceneCopy>> copies(count);
+  for (std::unique_ptr<SceneCopy>& copy : copies) copy = std::make_unique<SceneCopy>(scene);
+  return copies;
 }
 
 }  // namespace tenon::haptic

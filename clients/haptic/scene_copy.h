@@ -35,12 +35,11 @@ namespace tenon::haptic {
 ///   tells them; goals of hands are extrapolated likewise, slow ones only since the manifold came: so they
 ///   do not move in steps, and two people on one part do not swing.
 /// * An object that another hand holds close by is simulated with that hand's coupling, whose goal is
-///   extrapolated likewise. So it gives way to a push at once: in the server it does so for the push of a
-///   delay ago, and is heard another delay later.
+///   extrapolated likewise, so it yields without the round-trip delay.
 /// * A hand that the manifold lists no more, since it is frozen, keeps its object as in the server: without a
 ///   pull, and without a jump when its inputs resume. One whose object moves nevertheless is out of reach,
 ///   and its grasp ends. A pull on the hand's own object fades out and in within kPullFade; one on another
-///   object becomes as stiff as listed within it.
+///   object reaches the listed stiffness within kPullFade.
 /// * The object starts at the server's proxy, and again after each of its jumps. On a scene at rest both then
 ///   solve one problem for one device pose. Where the answer to a pose nevertheless stays away from what the
 ///   copy had for that pose, with all at rest, the copy has jumped(): the hand is re-anchored at the
@@ -163,5 +162,9 @@ class SceneCopy final : public ForceModel {
   bool following_ = false;
   bool diverged_ = false;
 };
+
+/// `count` copies, one for each hand of a station. Threads: any. Real-time: no.
+[[nodiscard]] std::vector<std::unique_ptr<SceneCopy>> copiesOf(
+    const std::shared_ptr<const simulation::Scene>& scene, std::size_t count);
 
 }  // namespace tenon::haptic

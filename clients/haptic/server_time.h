@@ -11,27 +11,22 @@
 
 namespace tenon::haptic {
 
-/// Which tick of the server belongs to an input of this station: the one that would use it if there were no
-/// delay. The answer of the last seconds that took least time, so that jitter and repeats do not shift it,
-/// was half of the round trip on its way. The input that it answers tells nothing: the server keeps inputs
-/// back, and fills ticks between sparse ones. Another epoch of the server begins anew.
-///
-/// Answers and round trips are measured at different times. A link that becomes longer by a way is noticed in
-/// answers first, which the fastest one outlasts until the round trip is known: then the server's ticks have
-/// not changed, and the answers before count as if they had taken the longer way. One that becomes shorter
-/// makes the tick too late by as much until the next round trip is told, about a second. Ways that differ in
-/// length are halved: an error of half their difference. Clocks that drift apart by 1e-4 are off by 1 tick at
-/// most.
+/// Estimates server tick - input seq: the fastest answer within two 5 s windows, plus half the round trip.
+/// The input that an answer names tells nothing here: the server keeps inputs back, and fills ticks between
+/// sparse ones. After a delay increase, old samples are corrected; after a decrease the error lasts until the
+/// next round-trip measurement (about 1 s). Asymmetry error: half the difference. Clocks that drift apart by
+/// 1e-4 are off by 1 tick at most. Another epoch of the server begins anew.
 ///
 /// Threads: one. Real-time: everything.
 class ServerTime {
  public:
   /// `round_trip` [s]: shortest of the link, as ClockSync measures it; 0: not known, or none.
   void setRoundTrip(double round_trip) noexcept {
-    const double before = there_;
-    there_ = std::isfinite(round_trip) ? 0.5 * std::clamp(round_trip, 0.0, kLongestTrip) / kTickSeconds : 0.0;
-    if (before > 0.0 && there_ > before)
-      for (double& ahead : ahead_) ahead = std::max(kUnknown, ahead - (there_ - before));
+    const double before = one_way_ticks_;
+    one_way_ticks_ =
+        std::isfinite(round_trip) ? 0.5 * std::clamp(round_trip, 0.0, kLongestTrip) / kTickSeconds : 0.0;
+    if (before > 0.0 && one_way_ticks_ > before)
+      for (double& ahead : ahead_) ahead = std::max(kUnknown, ahead - (one_way_ticks_ - before));
   }
   /// `heard` is the newest answer when input `seq` is read.
   void receive(const HandManifold& heard, std::uint32_t seq) noexcept {
@@ -50,7 +45,7 @@ class ServerTime {
   /// [ticks] of input `seq`; a half counts where the ways differ by a tick. Precondition: known().
   [[nodiscard]] double tickOf(std::uint32_t seq) const noexcept {
     // an answer without delay is of the last tick
-    return static_cast<double>(seq) + most() + 1.0 + there_;
+    return static_cast<double>(seq) + most() + 1.0 + one_way_ticks_;
   }
 
  private:
@@ -64,7 +59,7 @@ class ServerTime {
   std::uint32_t window_began_ = 0;
   Tick heard_tick_ = 0;
   std::uint32_t heard_epoch_ = 0;
-  double there_ = 0.0;  // [ticks] of the way to the server
+  double one_way_ticks_ = 0.0;  // [ticks] of the way to the server
 };
 
 }  // namespace tenon::haptic

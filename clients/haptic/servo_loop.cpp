@@ -1,16 +1,10 @@
 #include "clients/haptic/servo_loop.h"
 
-#include <chrono>
-
 namespace tenon::haptic {
 
 namespace {
 constexpr std::uint32_t kTelemetryEvery = 1000;  // [cycles]
 constexpr std::int64_t kCycleNs = 1'000'000;
-
-std::int64_t cycleTimeNs() {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-}
 }  // namespace
 
 void StationOutput::fill(const Station& station, std::uint32_t now) noexcept {
@@ -51,7 +45,7 @@ void ServoLoop::receiveAll(std::int64_t now) noexcept {
 }
 
 void ServoLoop::cycle() noexcept {
-  const std::int64_t now = cycleTimeNs();
+  const std::int64_t now = clock_->now().count();
   // before a raise that came after them, which asks for another one
   for (; presses_.front() != nullptr; presses_.pop()) station_.press();
   receiveAll(now);

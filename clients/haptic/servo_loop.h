@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <utility>
 
 #include "clients/haptic/force_age_statistics.h"
 #include "clients/haptic/station.h"
+#include "idl/threads/clock.h"
 #include "idl/threads/latest.h"
 #include "idl/threads/spsc_queue.h"
 #include "idl/types/messages/timing.h"
@@ -44,8 +46,11 @@ class PeakForces {
 /// Threads: one (servo) for cycle(), one (wire) for all else. Real-time: cycle().
 class ServoLoop {
  public:
-  /// `wake` is called at the end of each cycle, and must be real-time. `station` outlives this.
-  ServoLoop(Station& station, std::function<void()> wake) : station_(station), wake_(std::move(wake)) {}
+  /// `wake` is called at the end of each cycle, and must be real-time. `station` outlives this. `clock`
+  /// measures the cycles.
+  ServoLoop(Station& station, std::function<void()> wake,
+            std::shared_ptr<const threads::Clock> clock = std::make_shared<threads::SteadyClock>())
+      : station_(station), wake_(std::move(wake)), clock_(std::move(clock)) {}
 
   void cycle() noexcept;
   /// The next cycles take the forces away, and with `disarms` switch the devices off.
@@ -88,6 +93,7 @@ class ServoLoop {
 
   Station& station_;
   std::function<void()> wake_;
+  std::shared_ptr<const threads::Clock> clock_;
   std::atomic<Finish> finish_{Finish::kNot};  ///< kDone: by the loop; the others: by the wire thread
   std::atomic<ForceModelKind> force_model_{ForceModelKind::kManifold};
   std::atomic<double> link_jitter_{0.0};      ///< [s]

@@ -6,10 +6,12 @@
 #include "clients/haptic/haptic_hand.h"
 #include "devices/device.h"
 #include "devices/safety_rules.h"
+#include "idl/types/messages/timing.h"
 
 namespace tenon::haptic {
 
 namespace {
+constexpr double kLongestKnown = 10.0;  // [s] delay of a link, one way
 
 std::string describeSafety(const StationEvent& event) {
   const std::string rule = devices::toString(static_cast<devices::SafetyRule>(event.detail));
@@ -57,6 +59,12 @@ std::string describe(const StationEvent& event, const std::string& hand_name) {
       return hand + ": guided by a virtual fixture" + when;
     case StationEventKind::kGuidanceEnded:
       return hand + ": guidance ended" + when;
+    case StationEventKind::kGuidanceAlone:
+      return "contacts are not felt over this link: " + milliseconds() + " one way, " +
+             std::to_string(static_cast<int>(1e3 * kLongestContactDelay)) +
+             " ms at most; guidance continues" + when;
+    case StationEventKind::kContactsAgain:
+      return "contacts are felt again: " + milliseconds() + " one way" + when;
   }
   return "unknown event" + when;
 }
@@ -64,7 +72,8 @@ std::string describe(const StationEvent& event, const std::string& hand_name) {
 std::string describe(const HandDevice& device) {
   char radius[32];
   std::snprintf(radius, sizeof radius, "%.3f m", device.workspace_radius);
-  return "hand " + device.hand + ": " + device.model + ", workspace radius " + radius;
+  const std::string serial = device.serial.empty() ? "" : ", serial number " + device.serial;
+  return "hand " + device.hand + ": " + device.model + serial + ", workspace radius " + radius;
 }
 
 std::string Station::describe(const StationEvent& event) const {
@@ -170,6 +179,10 @@ void Station::report(const HapticHand& hand) noexcept {
   if (events.indexing_began) report(StationEventKind::kIndexingBegan, hand.id(), 0, 0.0);
   if (events.indexing_ended) report(StationEventKind::kIndexingEnded, hand.id(), 0, 0.0);
   if (events.stale_began) report(StationEventKind::kStale, hand.id(), 0, hand.state().manifold_age);
+  if (events.guidance_alone_began)
+    report(StationEventKind::kGuidanceAlone, hand.id(), 0, 1e3 * std::min(hand.linkDelay(), kLongestKnown));
+  if (events.guidance_alone_ended)
+    report(StationEventKind::kContactsAgain, hand.id(), 0, 1e3 * hand.linkDelay());
   if (events.guidance_began) report(StationEventKind::kGuidanceBegan, hand.id(), 0, 0.0);
   if (events.guidance_ended) report(StationEventKind::kGuidanceEnded, hand.id(), 0, 0.0);
   if (events.beyond_validity_began) {

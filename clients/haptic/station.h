@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -21,13 +22,11 @@
 #include "idl/types/messages/steps.h"
 #include "idl/types/result.h"
 
-namespace tenon::simulation {
-struct Scene;
-}
-
 namespace tenon::haptic {
 
 class HapticHand;
+class SceneCopy;
+using SceneCopies = std::vector<std::unique_ptr<SceneCopy>>;
 
 inline constexpr std::size_t kMaxStationHands = 4;
 
@@ -44,6 +43,8 @@ enum class StationEventKind : std::uint8_t {
   kArmed,           ///< the person has armed the devices
   kGuidanceBegan,   ///< a virtual fixture acts on the hand
   kGuidanceEnded,
+  kGuidanceAlone,  ///< the link is too long for contacts; value: [ms] one way
+  kContactsAgain,  ///< it is no more; value: likewise
 };
 
 /// Event for the log. Plain data, so that the 1 kHz loop can write it.
@@ -52,7 +53,7 @@ struct StationEvent {
   StationEventKind kind = StationEventKind::kSafetyBegan;
   HandId hand;
   std::uint32_t detail = 0;
-  double value = 0.0;       ///< [N], [s] or [ticks], see StationEventKind
+  double value = 0.0;       ///< [N], [s], [ms] or [ticks], see StationEventKind
   std::uint32_t count = 0;  ///< of safety: see above; else how many times, in one event; 0: once
   Tick tick = 0;            ///< newest one received when it happened
 };
@@ -64,6 +65,7 @@ struct StationEvent {
 struct HandDevice {
   std::string hand;               ///< its name
   std::string model;              ///< DeviceCaps::model
+  std::string serial;             ///< DeviceCaps::serial
   double workspace_radius = 0.0;  ///< [m] what the device reaches about C_w (Workspace)
 };
 
@@ -77,7 +79,7 @@ struct HandDevice {
 /// virtual clock. Deterministic: equal messages and seeds give bit-equal outputs.
 ///
 /// Threads: one. Real-time: receive of WorldFrame, HandManifold, Guidance and CollisionMatrix,
-/// step, setForceModel, finish.
+/// awaitReading, step, setForceModel, finish.
 class Station {
  public:
   Station() = default;
@@ -90,6 +92,10 @@ class Station {
   /// Join::stiffness, in the order of handNames().
   [[nodiscard]] virtual std::vector<HandStiffness> stiffness() const { return {}; }
   [[nodiscard]] virtual Role role() const = 0;
+  /// A device has a button that arms.
+  [[nodiscard]] virtual bool hasArmingButton() const { return false; }
+  /// Who moves its devices presses without being asked: a simulated person, or a script.
+  [[nodiscard]] virtual bool pressesItself() const { return false; }
   /// Of each hand that is moved by a device with a workspace.
   [[nodiscard]] virtual std::vector<HandDevice> handDevices() const { return {}; }
 
@@ -110,6 +116,11 @@ class Station {
   void press() noexcept;
   [[nodiscard]] const Arming& arming() const noexcept { return arming_; }
 
+  /// What paces the loop, for people, as "the device of hand right"; empty: no device of this station does.
+  [[nodiscard]] virtual std::string pacedBy() const { return {}; }
+  /// HapticDevice::awaitReading of the device that paces, for the next step; by the thread of step(). False
+  /// at once while it is being armed.
+  [[nodiscard]] virtual bool awaitReading(std::chrono::nanoseconds /*longest*/) noexcept { return false; }
   /// One cycle of devices, local models and simulated person; `seq` numbers the inputs.
   virtual void step(std::uint32_t seq) noexcept = 0;
   /// `dt` [s]: from the last step to the next one, by the clock of whoever calls step(); kTickSeconds unless
@@ -117,9 +128,9 @@ class Station {
   void setCycle(double dt) noexcept { dt_ = dt; }
   /// `jitter` [s] of the link, as its contacts have it lately (AnswerAge::setJitter); 0 unless told.
   void setLinkJitter(double jitter) noexcept { link_jitter_ = jitter; }
-  /// The server's compiled scene, for the force model `scene copy` of all hands: once. Allocates; also beside
-  /// step().
-  virtual void setScene(const std::shared_ptr<const simulation::Scene>& /*scene*/) {}
+  /// For the force model `scene copy`, one for each of handDevices(): a hand that has none takes one, now or
+  /// in welcome(), where each hand begins without. By the thread of welcome(), also beside step().
+  virtual void setCopies(SceneCopies&& /*copies*/) {}
   /// HapticHand::setForceModel of all hands.
   virtual void setForceModel(ForceModelKind /*kind*/) noexcept {}
   /// The one that was set; `manifold` at first.

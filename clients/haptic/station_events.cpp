@@ -21,7 +21,8 @@ void StationEvents::send(const StationEvent& event) {
   const bool is_safety =
       event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
   send(event.tick, is_safety ? "safety" : "station", text);
-  if (event.kind == StationEventKind::kGuidanceBegan || event.kind == StationEventKind::kGuidanceEnded)
+  if (event.kind == StationEventKind::kGuidanceBegan || event.kind == StationEventKind::kGuidanceEnded ||
+      event.kind == StationEventKind::kGuidanceAlone || event.kind == StationEventKind::kContactsAgain)
     print_(text);
   if (event.kind != StationEventKind::kDeviceFault) return;
   print_(text + (reads_keys_ ? "; look at the device, then press return to reset it" : ""));

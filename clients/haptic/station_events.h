@@ -26,8 +26,13 @@ class StationEvents {
   void send(Tick tick, const char* kind, const std::string& text);
   /// Of a step of the station: now, or later if it repeats.
   void receive(const StationEvent& event) {
-    if (repeated_.passes(event)) send(event);
+    if (repeated_.passes(event) && far_hands_.passes(event)) send(event);
   }
+  /// The station has new hands: what was told of the link is to be told of them.
+  void restart() { far_hands_.clear(); }
+  /// Contacts are not felt at one of the hands, since the link is too long
+  /// (StationEventKind::kGuidanceAlone).
+  [[nodiscard]] bool guidanceAlone() const { return far_hands_.any(); }
   /// Those that repeat and are due at step `seq` of the station.
   void sendDue(std::uint32_t seq) {
     while (const auto repeated = repeated_.takeDue(seq)) send(*repeated);
@@ -45,6 +50,7 @@ class StationEvents {
   std::function<void(const std::string&)> print_;
   bool reads_keys_ = false;
   RepeatedEvents repeated_;
+  FarHands far_hands_;
   std::uint64_t seq_ = 0;
   std::uint64_t devices_seq_ = 0;  ///< of the last event that names a device
 };

@@ -8,7 +8,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "clients/haptic/answer_readers.h"
@@ -18,7 +17,7 @@
 #include "clients/haptic/lockstep_answers.h"
 #include "clients/haptic/return_key.h"
 #include "clients/haptic/seat_file.h"
-#include "clients/haptic/servo_loop.h"
+#include "clients/haptic/servo_thread.h"
 #include "clients/haptic/station_events.h"
 #include "clients/haptic/station_link.h"
 #include "clients/haptic/station_stops.h"
@@ -33,8 +32,7 @@ constexpr milliseconds kRepeatAfter{500};
 // before another one: two programs that take each other's seat are not to do so many times a second.
 constexpr std::chrono::seconds kMinSeatTime{10};
 constexpr int kMaxRejoins = 3;
-constexpr int kServoPriority = 75;
-constexpr int kFinishSteps = 200;  // milliseconds, or steps in lockstep, to take the forces away, at most
+constexpr int kFinishSteps = 200;  // in lockstep, to take the forces away, at most
 
 std::atomic<bool>& stopFlag() {
   static std::atomic<bool> flag{false};
@@ -50,19 +48,34 @@ StepState withoutTexts(StepState step) {
   return step;
 }
 
+const char* wayToArm(bool by_key, bool by_button) {
+  if (by_key) return by_button ? "press return, or the device's arming button," : "press return";
+  return by_button ? "press the device's arming button" : "start it with --arm";
+}
+
+/// After a stop. A station that nobody can press at stays without forces.
+std::string wayToContinue(const Station& station, bool by_key) {
+  const bool by_button = station.hasArmingButton();
+  if (by_key || by_button) return wayToArm(by_key, by_button) + std::string(" to continue at this station");
+  return station.pressesItself() ? ""
+                                 : "nobody can press at this station: start it anew with --arm to continue";
+}
+
 class StationRunner {
  public:
   StationRunner(Station& station, StationLink& link, const StationProgramOptions& options)
       : station_(station),
         link_(link),
         options_(options),
-        servo_(station, [&link] { link.inbox().wake(); }),
+        servo_thread_(
+            station, [&link] { link.inbox().wake(); }, options.real_time),
+        servo_(servo_thread_.loop()),
         readers_(link, {[this](const WorldFrame& frame) { passAnswer(frame); },
                         [this](const HandManifold& manifold) { passAnswer(manifold); }}),
         stops_(link,
                {[this](const StopSignal& stop) { pass(stop); },
                 [this](const std::string& text) { print(text); }},
-               options.read_keys),
+               wayToContinue(station, options.read_keys)),
         arming_(station, [this](const std::string& text) { print(text); }),
         events_(
             station, link, [this](const std::string& text) { print(text); }, options.read_keys),
@@ -107,9 +120,6 @@ class StationRunner {
   /// Rejoins. `new_seat`: client, hands or server epoch differ from before, so the station has to restart.
   [[nodiscard]] Result<void> rejoin(const std::atomic<bool>& stop, bool& new_seat);
   void restartStation();
-  void startServo();
-  /// Stops the loop, of which the last cycles take the forces away; with `disarms` the devices are off.
-  void stopServo(bool disarms);
   [[nodiscard]] Result<RunState> takePart(const std::atomic<bool>& stop);
   /// To the loop, or in lockstep to the station itself.
   template <class Message>
@@ -131,8 +141,8 @@ class StationRunner {
   Station& station_;
   StationLink& link_;
   const StationProgramOptions& options_;
-  ServoLoop servo_;  // in real time
-  std::optional<threads::CyclicThread> servo_thread_;
+  ServoThread servo_thread_;  // in real time
+  ServoLoop& servo_;
   AnswerReaders readers_;
   StationStops stops_;
   bool lockstep_ = false;  // no loop: the wire thread steps the station
@@ -149,6 +159,7 @@ class StationRunner {
   CopyLoader copy_;
   LinkAdaptation adaptation_;
   ForceModelKind force_model_ = ForceModelKind::kManifold;
+  double answers_lost_ = 0.0;     // [-] as it was known last
   std::uint32_t output_seq_ = 0;  // of the loop's last output
   std::string printed_step_;
 };
@@ -183,7 +194,10 @@ Result<void> StationRunner::subscribe() {
 
 void StationRunner::sendTelemetry(Telemetry telemetry) {
   telemetry.client = link_.welcome().client;
-  adaptation_.measure(telemetry, readers_.hasSlowAlone());
+  const std::optional<double> lost = readers_.takeLoss();
+  telemetry.answers_lost = answers_lost_ = lost.value_or(answers_lost_);
+  telemetry.guidance_alone = events_.guidanceAlone();
+  adaptation_.measure(telemetry, readers_.hasSlowAlone() ? lost : std::nullopt);
   servo_.setLink(adaptation_.jitter(), adaptation_.roundTrip().value_or(0.0));
   if (adaptation_.isLong()) copy_.loadBeside(sceneHash());
   use(adaptation_.chooseModel(copy_.loaded()));
@@ -305,6 +319,8 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
 
 void StationRunner::restartStation() {
   station_.welcome(link_.welcome(), link_.objects());
+  lockstep_ ? copy_.renew() : copy_.renewBeside();
+  events_.restart();
   events_.sendDevices();
   if (step_) station_.receive(*step_);
   for (const auto& [part, matrix] : matrix_) station_.receive(matrix);
@@ -352,33 +368,17 @@ Result<RunState> StationRunner::takePartInLockstep(const std::atomic<bool>& stop
   return run_;
 }
 
-void StationRunner::startServo() {
-  threads::CyclicOptions cyclic;
-  cyclic.name = "servo";
-  if (options_.real_time) cyclic.fifo_priority = kServoPriority;
-  servo_thread_.emplace(std::make_shared<threads::SteadyClock>(), cyclic,
-                        [this](std::uint64_t) noexcept { servo_.cycle(); });
-  servo_thread_->start();
-}
-
-/// Before anything that may block: a device holds its last command.
-void StationRunner::stopServo(bool disarms) {
-  servo_.finish(disarms);
-  for (int i = 0; i < kFinishSteps && !servo_.finished(); ++i) std::this_thread::sleep_for(milliseconds(1));
-  servo_thread_.reset();
-  servo_.restart();
-}
-
 Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
   if (options_.real_time) print(threads::lockMemory());
-  startServo();
-  const std::string not_granted = servo_thread_->notGranted();
+  if (const std::string pacer = station_.pacedBy(); !pacer.empty()) print("the loop is paced by " + pacer);
+  servo_thread_.start();
+  const std::string not_granted = servo_thread_.notGranted();
   print(not_granted);
   if (options_.real_time)
     if (const std::string missing = wire::raiseWireThreads(); not_granted.empty()) print(missing);
   auto run = takePart(stop);
   copy_.cancel();
-  stopServo(true);
+  servo_thread_.stop(true);
   awaitArming(stop);
   station_.end();
   char silence[64];
@@ -404,10 +404,10 @@ Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
     // meanwhile the loop obeys stops, and no force outlives the age of its contacts
     if (must_restart && arming_.isUnderWay()) continue;
     if (std::exchange(must_restart, false)) {
-      stopServo(false);
+      servo_thread_.stop(false);
       restartStation();
       armDevices(stop);
-      startServo();
+      servo_thread_.start();
     }
     takeLoadedScene();
     if (const StationOutput* const output = servo_.takeOutput()) {
@@ -418,7 +418,7 @@ Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
     adaptation_.askClock();
     if (const Telemetry* const statistics = servo_.takeTelemetry()) {
       Telemetry telemetry = *statistics;
-      telemetry.loop_overruns = servo_thread_->lateTicks();
+      telemetry.loop_overruns = servo_thread_.lateCycles();
       sendTelemetry(telemetry);
     }
   }
@@ -453,13 +453,14 @@ Result<RunState> runStation(Station& station, const StationProgramOptions& optio
   if (!options.seat_file.empty()) membership.seat = readSeatKey(options.seat_file);
   auto link = StationLink::open(membership, stop);
   if (!link) return fail(link.error().what);
+  if (options.seated) options.seated();
   if (options.print) options.print("joined as client " + std::to_string((*link)->welcome().client.value));
   if (auto kept = writeSeatKey(options.seat_file, (*link)->member().seat()); !kept && options.print)
     options.print(kept.error().what);
   if (options.armed) station.press();
   if (options.print && station.arming().awaitsPress())
-    options.print(options.read_keys ? "not armed: press return to switch the forces on"
-                                    : "not armed: start it with --arm to switch the forces on");
+    options.print(std::string("not armed: ") + wayToArm(options.read_keys, station.hasArmingButton()) +
+                  " to switch the forces on");
   auto runner = std::make_unique<StationRunner>(station, **link, options);
   return runner->run(stop);
 }

@@ -25,6 +25,7 @@ struct StationProgramOptions {
   SceneSource scene;                              ///< for the force model `scene copy`
   std::string language = "en";                    ///< of the printed instructions
   std::function<void(const std::string&)> print;  ///< one line for the person at the terminal; may be empty
+  std::function<void()> seated;                   ///< called once, when it has a seat; may be empty
 };
 
 /// Runs a station in a session until the run is over or `stop` is set; returns the last state of the run.

@@ -19,8 +19,9 @@ void StationStops::raise(const EmergencyStop& stop) {
   if (!change) return;
   tell();
   if (change.superfluous) return;
-  say("emergency stop by " + stop.who + ": " + stop.reason);
+  say("emergency stop by " + stop.who + (stop.reason.empty() ? "" : ": " + stop.reason));
   static_cast<void>(link_.send(stop));
+  if (change.ended) static_cast<void>(link_.withdraw(*change.ended));
 }
 
 /// Of who raises or clears many, once.
@@ -30,14 +31,12 @@ void StationStops::say(const std::string& text) {
 }
 
 void StationStops::clear(const EmergencyClear& cleared) {
-  const auto raise = truth_.standing().find({cleared.client_guid, cleared.counter});
-  const bool stood = raise != truth_.standing().end();
-  if (stood) static_cast<void>(link_.withdraw(raise->second));
-  truth_.clear(cleared);
-  if (!stood) return;
+  const StopChange change = truth_.clear(cleared);
+  if (!change.ended) return;
+  static_cast<void>(link_.withdraw(*change.ended));
   tell();
-  say("emergency stop cleared by " + cleared.who + ": " + cleared.reason);
-  if (!truth_.engaged() && reads_keys_) callbacks_.print("press return to continue at this station");
+  say("emergency stop cleared by " + cleared.who + (cleared.reason.empty() ? "" : ": " + cleared.reason));
+  if (!truth_.engaged() && !to_continue_.empty()) callbacks_.print(to_continue_);
 }
 
 }  // namespace tenon::haptic

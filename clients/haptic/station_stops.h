@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "clients/haptic/station.h"
 #include "clients/haptic/station_link.h"
@@ -21,9 +22,10 @@ class StationStops {
     std::function<void(const std::string&)> print;
   };
 
-  /// `link` must outlive this; `reads_keys`: who is at the station continues it by the return key.
-  StationStops(StationLink& link, Callbacks callbacks, bool reads_keys)
-      : link_(link), callbacks_(std::move(callbacks)), reads_keys_(reads_keys) {}
+  /// `link` must outlive this; `to_continue` is said when the stop is cleared: what the person at the station
+  /// does next. Empty: nothing.
+  StationStops(StationLink& link, Callbacks callbacks, std::string to_continue)
+      : link_(link), callbacks_(std::move(callbacks)), to_continue_(std::move(to_continue)) {}
 
   [[nodiscard]] Result<void> subscribe();
 
@@ -35,7 +37,7 @@ class StationStops {
 
   StationLink& link_;
   Callbacks callbacks_;
-  bool reads_keys_ = false;
+  std::string to_continue_;
   StopTruth truth_;
   std::string said_;  ///< the last line
 };

@@ -40,7 +40,7 @@ class VirtualFixture {
 
   explicit VirtualFixture(const FixtureLimits& limits);
 
-  /// Older ticks and server epochs are ignored; one with numbers that cannot be is as good as none.
+  /// Older ticks and server epochs are ignored; implausible values switch the fixture off.
   void receive(const Guidance& guidance) noexcept;
   /// One cycle of `dt` [s] with the hand at X_WH; `permitted`: otherwise the fixture ends. The wrench on the
   /// hand about its origin, in W.

@@ -26,7 +26,7 @@ bool WorldView::receive(const WorldFrame& frame) noexcept {
   if (frame.server_epoch > server_epoch_) {
     server_epoch_ = frame.server_epoch;
     tick_ = 0;
-    for (ObservedObject& object : objects_) object.updated_at = 0;
+    for (ObservedObject& object : objects_) object.updated_at = object.jumped_at = 0;
   }
   tick_ = std::max(tick_, frame.tick);
   for (const ObjectState& state : frame.states) {
@@ -35,6 +35,7 @@ bool WorldView::receive(const WorldFrame& frame) noexcept {
     if (object.updated_at > frame.tick) continue;
     object.X_WO = state.X_WO;
     object.V_WO = {state.V_WO.head<3>().cast<double>(), state.V_WO.tail<3>().cast<double>()};
+    if (object.updated_at > 0 && object.epoch != state.epoch) object.jumped_at = frame.tick;
     object.epoch = state.epoch;
     object.status = static_cast<ObjectStatus>(state.status);
     object.holder = state.holder;

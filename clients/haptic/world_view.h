@@ -16,7 +16,8 @@ struct ObservedObject {
   ObjectStatus status = ObjectStatus::kHidden;
   HandId holder;
   bool in_contact = false;
-  Tick updated_at = 0;               ///< server tick of this state
+  Tick updated_at = 0;  ///< server tick of this state
+  Tick jumped_at = 0;   ///< server tick of the first state with this epoch; 0: no other was heard
   Vector3 p_OQ_O = Vector3::Zero();  ///< [m] its centre, of its bounding box
   double radius = 0.0;               ///< [m] half the diagonal of that box; 0 when it is not known
 

@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "clients/haptic/scene_copy.h"
 #include "clients/rehearse/rehearsal.h"
 #include "clients/rehearse/script.h"
 #include "clients/rehearse/tick_log.h"
@@ -261,7 +262,7 @@ int rehearsePeople(RehearseArguments& arguments) {
     const auto compiled = compiledScene(*loaded->scene);
     if (!compiled) return printError(compiled.error().what);
     for (const auto& station : *stations) {
-      station->setScene(*compiled);
+      station->setCopies(tenon::haptic::copiesOf(*compiled, station->handDevices().size()));
       station->setForceModel(arguments.force_model);
     }
   }

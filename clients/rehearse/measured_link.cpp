@@ -6,6 +6,7 @@ namespace tenon::rehearse {
 
 void MeasuredLink::deliver(Tick now, haptic::Station& station) {
   link_.deliver(now, station, [&](const HandManifold& manifold) {
+    loss_.received(manifold.hand, manifold.sent, nanoseconds(now));
     ages_.answerReceived(manifold.hand, manifold.tick, manifold.answers_seq, nanoseconds(now));
   });
   link_.deliverAnswers(now, [&](const ClockSync& answer) { clock_.receive(answer, nanoseconds(now)); });
@@ -21,13 +22,13 @@ void MeasuredLink::measure(Tick now) {
   Telemetry telemetry;
   clock_.fill(telemetry, nanoseconds(now));
   ages_.fill(telemetry);
-  choice_ = chooser_.step(
-      {.input_gap = telemetry.input_gap,
-       .trip_jitter = telemetry.trip_jitter,
-       .age_jitter = telemetry.jitter,
-       .inputs_lost = telemetry.inputs_lost,
-       .answers_lost = rates_.slowAnswers() ? std::optional(telemetry.answers_lost) : std::nullopt,
-       .input_period = rates_.inputPeriod(1)});
+  const std::optional<double> lost = loss_.take();
+  choice_ = chooser_.step({.input_gap = telemetry.input_gap,
+                           .trip_jitter = telemetry.trip_jitter,
+                           .age_jitter = telemetry.jitter,
+                           .inputs_lost = telemetry.inputs_lost,
+                           .answers_lost = rates_.slowAnswers() ? lost : std::nullopt,
+                           .input_period = rates_.inputPeriod(1)});
   round_trip_ = telemetry.clock_known ? std::optional(telemetry.round_trip) : std::nullopt;
 }
 
@@ -49,8 +50,11 @@ void MeasuredLink::send(std::span<const DeviceInput> inputs, Tick now) {
 void MeasuredLink::send(const session::OutgoingMessages& outgoing, Tick now) {
   const bool slow = rates_.slowAnswers();
   for (const WorldFrame& frame : slow ? outgoing.frames_100 : outgoing.frames) link_.send(frame, now);
-  for (const HandManifold* manifold : slow ? outgoing.manifolds_50 : outgoing.manifolds)
-    link_.send(*manifold, now);
+  for (const HandManifold* manifold : slow ? outgoing.manifolds_50 : outgoing.manifolds) {
+    HandManifold numbered = *manifold;
+    numbered.sent = ++sent_[numbered.hand];
+    link_.send(numbered, now);
+  }
 }
 
 void MeasuredLink::receive(Tick now, ClientId client, session::SessionRegistry& registry,

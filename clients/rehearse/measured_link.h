@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 
+#include "clients/haptic/answer_loss.h"
 #include "clients/haptic/force_age_statistics.h"
 #include "clients/haptic/input_pacer.h"
 #include "clients/haptic/limit_chooser.h"
@@ -51,6 +53,7 @@ class MeasuredLink {
   SimulatedLink link_;
   haptic::LinkClock clock_;
   haptic::ForceAgeStatistics ages_;
+  haptic::AnswerLoss loss_;
   haptic::LimitChooser chooser_;
   haptic::LinkChoice choice_;
   haptic::RateChooser rates_;
@@ -59,6 +62,7 @@ class MeasuredLink {
   session::InputBuffer buffer_;
   session::GapMeter gaps_;
   std::uint32_t received_ = 0, newest_seq_ = 0;  ///< as ClockSync says them
+  std::map<HandId, std::uint32_t> sent_;         ///< HandManifold::sent
   session::TickInput taken_;
 };
 

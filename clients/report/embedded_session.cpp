@@ -124,10 +124,10 @@ Result<void> SessionReduction::read(const fs::path& file) {
 void SessionReduction::add(const record::McapMessage& message) {
   static const std::set<std::string_view> kStates{
       wire::kSessionAnnounce.name, wire::kSceneObject.name,    wire::kSceneHand.name,
-      wire::kSceneStep.name,       wire::kObjectSnapshot.name, wire::kStepState.name,
-      wire::kRunState.name,        wire::kGrabState.name,      wire::kPresence.name,
-      wire::kEmergencyStop.name,   wire::kEmergencyClear.name, wire::kEventLog.name,
-      record::kInstanceStateTopic};
+      wire::kSceneStep.name,       wire::kSceneTitle.name,     wire::kObjectSnapshot.name,
+      wire::kStepState.name,       wire::kRunState.name,       wire::kGrabState.name,
+      wire::kPresence.name,        wire::kEmergencyStop.name,  wire::kEmergencyClear.name,
+      wire::kEventLog.name,        record::kInstanceStateTopic};
   if (const auto state = kStates.find(message.topic); state != kStates.end())
     addState(*state, message);
   else if (message.topic == wire::kWorldFrame30.name)

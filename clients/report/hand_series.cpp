@@ -34,10 +34,16 @@ HandFigures evaluate(const HandSeries& hand, const std::function<bool(ObjectId, 
   HandFigures figures;
   auto sent = hand.sent.begin();
   auto displayed = hand.displayed.begin();
+  InputNumber before = hand.samples.empty() ? InputNumber{} : hand.samples.front().answers;
   for (const HandSample& sample : hand.samples) {
+    const bool is_same_station = before.beginnings == sample.answers.beginnings;
+    addPoint(figures.answered, sample.tick,
+             is_same_station ? static_cast<double>(sample.answers.seq - before.seq) : 0.0);
+    before = sample.answers;
     const bool in_contact = !sample.frozen && touches(sample.object, sample.tick);
     addPoint(figures.contact, sample.tick, in_contact ? 1.0 : 0.0);
     for (; displayed != hand.displayed.end() && displayed->number <= sample.answers; ++displayed) {
+      addPoint(figures.stated, sample.tick, 1.0);
       if (sample.frozen) continue;
       addPoint(figures.force, sample.tick, displayed->peak);
       if (in_contact) addPoint(figures.contact_force, sample.tick, displayed->force);

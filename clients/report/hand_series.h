@@ -65,6 +65,8 @@ struct HandFigures {
   Series contact_force;  ///< [N] while its object is in contact
   Series contact;        ///< [-] 1 while its object is in contact, else 0
   Series gap;            ///< [m] between the device and the proxy
+  Series answered;       ///< [-] inputs of the station, since the sample before
+  Series stated;         ///< [-] 1 for each state of the hand that the station has said
 };
 
 /// `touches`: whether an object is in contact at a tick.

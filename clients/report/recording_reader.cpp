@@ -63,6 +63,7 @@ class RecordingReader {
     subscribe<Telemetry>(wire::kTelemetry);
     subscribe<Guidance>(wire::kGuidance);
     subscribe<ForceContribution>(wire::kForceContribution);
+    subscribe<PublishedSamples>(wire::kPublishedSamples);
   }
 
   void read(const record::McapMessage& message) {
@@ -105,6 +106,7 @@ class RecordingReader {
   void receive(const DeviceInput& input) { session_.hands[input.hand].add(input); }
   void receive(const HandManifold& manifold) {
     advanceTo(manifold.tick);
+    session_.coverage.addManifold(manifold.hand, manifold.tick);
     session_.hands[manifold.hand].add(manifold);
   }
   void receive(const HandState& state) {
@@ -148,6 +150,7 @@ class RecordingReader {
     session_.guided = session_.guided || guidance.mode != GuidanceMode::kOff;
   }
   void receive(const ForceContribution&) { session_.external_force = true; }
+  void receive(const PublishedSamples& published) { session_.coverage.add(published); }
   void countCommand(const std::string& text, int times);
 
   [[nodiscard]] bool isOfAHand(ObjectId object);
@@ -184,6 +187,7 @@ void RecordingReader::receive(const SceneObject& object) {
 
 void RecordingReader::receive(const WorldFrame& frame) {
   advanceTo(frame.tick);
+  session_.coverage.addSample(wire::kWorldFrame100.name, frame.tick);
   for (const ObjectState& state : frame.states)
     session_.positions[state.object].push_back(
         {frame.tick, state.epoch, state.X_WO.translation().cast<float>()});
@@ -192,6 +196,7 @@ void RecordingReader::receive(const WorldFrame& frame) {
 void RecordingReader::receive(const ContactPairs& pairs) {
   constexpr double kSampleSeconds = 0.01;
   advanceTo(pairs.tick);
+  session_.coverage.addSample(wire::kContactPairs100.name, pairs.tick);
   double depth = 0.0;
   bool assisted = false;
   for (const PairContact& pair : pairs.pairs) {
@@ -211,6 +216,7 @@ void RecordingReader::receive(const ContactPairs& pairs) {
 
 void RecordingReader::receive(const TickStats& stats) {
   advanceTo(stats.tick);
+  session_.coverage.addSample(wire::kTickStats100.name, stats.tick);
   addPoint(session_.load, stats.tick, stats.load_percent);
   addPoint(session_.depth, stats.tick, 0.0);  // pairs apart are not published
   addPoint(session_.compute, stats.tick, stats.compute_seconds);
@@ -226,7 +232,7 @@ void RecordingReader::receive(const StepProgress& progress) {
   advanceTo(progress.tick);
   double& longest = session_.contact_seconds[progress.revision];
   if (std::isfinite(progress.contact_seconds)) longest = std::max(longest, progress.contact_seconds);
-  session_.errors[progress.revision] = {progress.position_error, progress.angle_error};
+  session_.measures[progress.revision] = {progress.tick, {progress.position_error, progress.angle_error}};
 }
 
 void RecordingReader::receive(const Telemetry& telemetry) {
@@ -241,6 +247,8 @@ void RecordingReader::receive(const Telemetry& telemetry) {
   latency.inputs_lost += share * (telemetry.inputs_lost - latency.inputs_lost);
   latency.answers_lost += share * (telemetry.answers_lost - latency.answers_lost);
   latency.inputs_replaced += share * (telemetry.inputs_replaced - latency.inputs_replaced);
+  latency.answers_replaced += share * (telemetry.answers_replaced - latency.answers_replaced);
+  latency.guidance_alone += share * ((telemetry.guidance_alone ? 1.0 : 0.0) - latency.guidance_alone);
   latency.ticks_without_input += share * (telemetry.ticks_without_input - latency.ticks_without_input);
   if (!telemetry.clock_known) return;
   latency.clock_known = true;
@@ -268,6 +276,22 @@ void RecordingReader::countCommand(const std::string& text, int times) {
   }
 }
 
+/// "12 of 15" by topic, as a recorder writes at its end.
+std::map<std::string, SampleCount> readCounts(const record::McapReader& recording) {
+  std::map<std::string, SampleCount> counts;
+  const auto [begin, end] = recording.metadata().equal_range("tenon samples");
+  for (auto samples = begin; samples != end; ++samples)
+    for (const auto& [topic, text] : samples->second) {
+      SampleCount& count = counts[topic];
+      const char* const last = text.data() + text.size();
+      const auto recorded = std::from_chars(text.data(), last, count.recorded);
+      constexpr std::string_view kOf = " of ";
+      const std::string_view rest(recorded.ptr, static_cast<std::size_t>(last - recorded.ptr));
+      if (rest.starts_with(kOf)) std::from_chars(recorded.ptr + kOf.size(), last, count.published);
+    }
+  return counts;
+}
+
 }  // namespace
 
 bool RecordedSession::touches(ObjectId object, Tick tick) const {
@@ -289,6 +313,7 @@ Result<RecordedSession> readRecording(const std::filesystem::path& file) {
   for (record::McapMessage message; recording->next(message);) reader.read(message);
   reader.finish();
   session.problem = recording->problem();
+  session.counts = readCounts(*recording);
   if (session.messages == 0)
     return fail(file.string() + ": holds no messages" +
                 (session.problem.empty() ? "" : " (" + session.problem + ")"));

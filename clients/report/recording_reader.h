@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/report/hand_series.h"
+#include "clients/report/sample_coverage.h"
 #include "clients/report/series.h"
 #include "idl/types/messages/log.h"
 #include "idl/types/messages/run.h"
@@ -39,8 +40,10 @@ struct ForceLatency {
   double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [s]
   double silence = 0.0;                    ///< [s] longest without an answer of the server
   double jitter = 0.0;                     ///< [s] largest of a second, 99th percentile less the minimum
-  double inputs_lost = 0.0, answers_lost = 0.0;             ///< [-] mean shares
-  double inputs_replaced = 0.0, ticks_without_input = 0.0;  ///< [-] likewise
+  double inputs_lost = 0.0, answers_lost = 0.0;          ///< [-] mean shares
+  double inputs_replaced = 0.0, answers_replaced = 0.0;  ///< [-] likewise
+  double ticks_without_input = 0.0;                      ///< [-] likewise
+  double guidance_alone = 0.0;     ///< [-] share of the time in which the link was too long for contacts
   std::uint32_t freeze_ticks = 0;  ///< [ticks] largest HandLimits::freeze_ticks of its hands
   double round_trip = 0.0;         ///< [s] shortest
   double clock_offset = 0.0,
@@ -62,14 +65,22 @@ struct TargetError {
   double angle = 0.0;     ///< [rad]
 };
 
+/// What the server has measured of a step last.
+struct StepMeasure {
+  Tick tick = 0;
+  TargetError error;
+};
+
 /// What a recording holds that an analysis needs. Topics reach a recorder in no order among each other, and
 /// on a busy machine in long batches: each of these is of one topic, in its order, unless it says more.
 struct RecordedSession {
   std::string problem;  ///< why the file is incomplete; empty: it is complete
   std::uint64_t messages = 0;
-  std::uint64_t malformed = 0;  ///< messages that could not be decoded
-  std::int64_t began_ns = 0;    ///< [ns] since 1970
-  Tick last = 0;                ///< of all messages
+  std::uint64_t malformed = 0;                ///< messages that could not be decoded
+  SampleCoverage coverage;                    ///< of the streams that figures rest on
+  std::map<std::string, SampleCount> counts;  ///< by topic, as the recorder has counted when it ended
+  std::int64_t began_ns = 0;                  ///< [ns] since 1970
+  Tick last = 0;                              ///< of all messages
 
   SessionAnnounce announce;
   RunState run;
@@ -82,7 +93,7 @@ struct RecordedSession {
   std::map<ObjectId, std::vector<Tick>> collisions;  ///< likewise, with what is no hand's own
   std::vector<StepState> steps;
   std::map<std::uint32_t, double> contact_seconds;       ///< [s] by step revision
-  std::map<std::uint32_t, TargetError> errors;           ///< newest, by step revision
+  std::map<std::uint32_t, StepMeasure> measures;         ///< newest, by step revision
   std::map<ObjectId, std::vector<PathPoint>> positions;  ///< at 100 Hz; at the end sorted
   std::vector<SessionEvent> events;
   std::vector<SessionEvent> client_events;

@@ -2,14 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <optional>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "idl/types/names.h"
+#include "idl/wire/topics.h"
+
 namespace tenon::report {
 namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 Tick tickOf(double seconds) { return static_cast<Tick>(std::llround(seconds / kTickSeconds)); }
 
@@ -22,6 +30,7 @@ class SessionAnalyzer {
 
   SessionAnalysis run() {
     copyFacts();
+    countMissing();
     for (const StepState& step : session_.steps) addVisit(step);
     endVisits();
     mergeHands();
@@ -34,8 +43,11 @@ class SessionAnalyzer {
 
  private:
   void copyFacts();
+  void countMissing();
+  [[nodiscard]] bool lacks(std::string_view topic, double begin, double end) const;
+  [[nodiscard]] bool lacksForces(double begin, double end) const;
   void addVisit(const StepState& step);
-  [[nodiscard]] bool wasDone(const StepVisit& visit) const;
+  void endByEvents(StepVisit& visit, bool led_back) const;
   void endVisits();
   void mergeHands();
   void sortEvents();
@@ -43,13 +55,15 @@ class SessionAnalyzer {
   void dropOwnGrabs();
   void summarize();
   [[nodiscard]] double pathOf(const StepVisit& visit) const;
-  [[nodiscard]] int collisionsOf(const StepVisit& visit) const;
+  [[nodiscard]] std::optional<int> collisionsOf(const StepVisit& visit) const;
+  void measure(StepVisit& visit) const;
   [[nodiscard]] SessionMetrics metrics(double begin, double end) const;
 
   RecordedSession& session_;
   const std::string& language_;
   SessionAnalysis analysis_;
   std::vector<Series> contact_forces_;  ///< [N] of each of the trainee's hands
+  std::vector<HandFigures> hands_;      ///< of the trainee: inputs and statements
   Series contact_;                      ///< 1 while a trainee's object is in contact, else 0
 };
 
@@ -78,6 +92,51 @@ void SessionAnalyzer::copyFacts() {
   }
 }
 
+/// By the recorder's own count, or, where it was killed, by what is in the file.
+void SessionAnalyzer::countMissing() {
+  constexpr Tick kAll = std::numeric_limits<Tick>::max();
+  auto& missing = analysis_.missing;
+  for (const auto& [topic, count] : session_.counts)
+    if (count.missing() > 0) missing[topic] = count;
+  for (const std::string_view topic : {wire::kWorldFrame100.name, wire::kContactPairs100.name,
+                                       wire::kTickStats100.name, wire::kHandManifold.name}) {
+    const SampleCount count = session_.coverage.between(topic, 1, kAll);
+    const auto counted = missing.find(std::string(topic));
+    const std::uint64_t known = counted == missing.end() ? 0 : counted->second.missing();
+    if (count.missing() > known) missing[std::string(topic)] = count;
+  }
+  if (missing.empty()) return;
+  std::string text;
+  for (const auto& [topic, count] : missing)
+    text +=
+        fmt::format("{}{} of {} of {}", text.empty() ? "" : ", ", count.missing(), count.published, topic);
+  std::string& problem = analysis_.problem;
+  problem += fmt::format("{}samples are missing: {}; figures that rest on too few of them are left blank",
+                         problem.empty() ? "" : "; ", text);
+}
+
+/// Too much of a topic to rest a figure on.
+bool SessionAnalyzer::lacks(std::string_view topic, double begin, double end) const {
+  // a step's first tick follows the one at which it has begun
+  return session_.coverage.between(topic, tickOf(begin) + 1, tickOf(end)).isSubstantial();
+}
+
+/// Of what the stations have said, of which nobody counts how much that was: one in 10 inputs.
+bool SessionAnalyzer::lacksForces(double begin, double end) const {
+  constexpr double kInputsOfAStatement = 10.0;
+  constexpr double kLeast = 50.0;  // [-] statements, below which a hand has hardly been there
+  const auto sum = [&](const Series& series) {
+    double all = 0.0;
+    for (const SeriesPoint& point : between(series, begin, end)) all += point.value;
+    return all;
+  };
+  for (const HandFigures& hand : hands_) {
+    const double expected = sum(hand.answered) / kInputsOfAStatement;
+    if (expected >= kLeast && sum(hand.stated) < 0.5 * expected) return true;
+  }
+  return false;
+}
+
 void SessionAnalyzer::addVisit(const StepState& step) {
   analysis_.steps = std::max(analysis_.steps, step.steps);
   auto& visits = analysis_.visits;
@@ -88,12 +147,10 @@ void SessionAnalyzer::addVisit(const StepState& step) {
     return;
   }
   if (step.phase == StepPhase::kWaiting) return;
-  // a step ends where the next one begins; one that ends without a message was done if a later one follows,
-  // else abandoned
+  // a step ends where the next one begins
   if (!visits.empty()) visits.back().end = secondsOf(step.started);
   if (!visits.empty() && visits.back().phase == StepPhase::kActive)
-    visits.back().phase =
-        step.step > visits.back().step && wasDone(visits.back()) ? StepPhase::kDone : StepPhase::kWaiting;
+    endByEvents(visits.back(), step.step <= visits.back().step);
   StepVisit visit;
   visit.step = step.step;
   visit.object = step.object;
@@ -112,27 +169,42 @@ void SessionAnalyzer::addVisit(const StepState& step) {
   visits.push_back(std::move(visit));
 }
 
-/// By the event log: a step that was left by a command has no such event. A log without any is not asked.
-bool SessionAnalyzer::wasDone(const StepVisit& visit) const {
+/// How a step ended of whose end there is no message: by the log of events, which says that of each step that
+/// did not end by a command; `led_back`: to it or one before it.
+void SessionAnalyzer::endByEvents(StepVisit& visit, bool led_back) const {
+  static const std::map<std::string_view, StepPhase> kEnds{{"step done", StepPhase::kDone},
+                                                           {"step skipped", StepPhase::kSkipped},
+                                                           {"step timed out", StepPhase::kTimedOut}};
   constexpr double kSlack = 0.01;  // [s] some ticks between end and begin
-  bool any = false;
+  bool is_led = led_back;
   for (const SessionEvent& event : session_.events) {
-    if (event.kind != "step done") continue;
-    any = true;
-    if (event.text.starts_with(visit.name + " (") && event.time >= visit.begin &&
-        event.time <= visit.end + kSlack)
-      return true;
+    if (event.time < visit.begin || event.time > visit.end + kSlack) continue;
+    const auto end = kEnds.find(event.kind);
+    if (end != kEnds.end() && event.text.starts_with(visit.name + " (")) {
+      visit.phase = end->second;
+      return;
+    }
+    is_led = is_led || (event.kind == "command" &&
+                        event.text.find(fmt::format(": {} ", commandName(CommandKind::kGoToStep))) !=
+                            std::string::npos);
   }
-  return !any;
+  visit.phase = StepPhase::kWaiting;
+  visit.is_end_known = is_led;
 }
 
 void SessionAnalyzer::endVisits() {
-  if (!analysis_.visits.empty()) analysis_.visits.back().end = analysis_.duration;
-  for (StepVisit& visit : analysis_.visits) {
-    if (visit.phase != StepPhase::kActive) continue;
-    if (analysis_.run.phase == RunPhase::kSucceeded) visit.phase = StepPhase::kDone;
-    if (analysis_.run.phase == RunPhase::kFailed) visit.phase = StepPhase::kTimedOut;
-  }
+  auto& visits = analysis_.visits;
+  if (visits.empty()) return;
+  StepVisit& last = visits.back();
+  last.end = analysis_.duration;
+  if (last.phase != StepPhase::kActive) return;
+  const RunState& run = analysis_.run;
+  if (run.phase == RunPhase::kFailed) last.phase = StepPhase::kTimedOut;
+  if (run.phase != RunPhase::kSucceeded) return;
+  if (run.steps_skipped == 0 && run.steps_timed_out == 0)
+    last.phase = StepPhase::kDone;
+  else
+    endByEvents(last, false);
 }
 
 void SessionAnalyzer::mergeHands() {
@@ -146,6 +218,7 @@ void SessionAnalyzer::mergeHands() {
     append(analysis_.gap, figures.gap);
     if (hand.role == Role::kTrainee) append(contact_, figures.contact);
     contact_forces_.push_back(std::move(figures.contact_force));
+    hands_.push_back({.answered = std::move(figures.answered), .stated = std::move(figures.stated)});
   }
   for (Series* series : {&analysis_.trainee_force, &analysis_.instructor_force, &analysis_.gap, &contact_})
     *series = mergedToLargest(std::move(*series));
@@ -168,10 +241,13 @@ void SessionAnalyzer::listAids() {
 
 SessionMetrics SessionAnalyzer::metrics(double begin, double end) const {
   SessionMetrics result;
-  result.peak_force = peak(analysis_.trainee_force, begin, end);
-  result.gap = peak(analysis_.gap, begin, end);
-  result.depth = peak(analysis_.depth, begin, end);
-  result.load = peak(analysis_.load, begin, end);
+  const bool has_contacts = !lacks(wire::kContactPairs100.name, begin, end);
+  const bool has_manifolds = !lacks(wire::kHandManifold.name, begin, end);
+  const bool has_forces = has_manifolds && !lacksForces(begin, end);
+  result.peak_force = has_forces ? peak(analysis_.trainee_force, begin, end) : kUnknown;
+  result.gap = has_manifolds ? peak(analysis_.gap, begin, end) : kUnknown;
+  result.depth = has_contacts ? peak(analysis_.depth, begin, end) : kUnknown;
+  result.load = lacks(wire::kTickStats100.name, begin, end) ? kUnknown : peak(analysis_.load, begin, end);
   double sum = 0.0;
   std::size_t count = 0;
   for (const Series& force : contact_forces_) {
@@ -180,8 +256,10 @@ SessionMetrics SessionAnalyzer::metrics(double begin, double end) const {
     count += points.size();
   }
   if (count > 0) result.mean_force = sum / static_cast<double>(count);
+  if (!has_forces || !has_contacts) result.mean_force = kUnknown;
   for (const SeriesPoint& point : between(contact_, begin, end))
     result.contact_seconds += point.value * kTickSeconds;
+  if (!has_manifolds || !has_contacts) result.contact_seconds = kUnknown;
   return result;
 }
 
@@ -194,6 +272,7 @@ void SessionAnalyzer::dropOwnGrabs() {
 }
 
 double SessionAnalyzer::pathOf(const StepVisit& visit) const {
+  if (lacks(wire::kWorldFrame100.name, visit.begin, visit.end)) return kUnknown;
   const auto path = session_.positions.find(visit.object);
   if (path == session_.positions.end()) return 0.0;
   double length = 0.0;
@@ -207,8 +286,9 @@ double SessionAnalyzer::pathOf(const StepVisit& visit) const {
   return length;
 }
 
-int SessionAnalyzer::collisionsOf(const StepVisit& visit) const {
+std::optional<int> SessionAnalyzer::collisionsOf(const StepVisit& visit) const {
   constexpr double kApart = 0.2;  // [s] a shorter interruption does not end a contact
+  if (lacks(wire::kContactPairs100.name, visit.begin, visit.end)) return std::nullopt;
   const auto contacts = session_.collisions.find(visit.object);
   if (contacts == session_.collisions.end()) return 0;
   int count = 0;
@@ -222,22 +302,35 @@ int SessionAnalyzer::collisionsOf(const StepVisit& visit) const {
   return count;
 }
 
+/// What the server has measured of the step last, if that is of its end.
+void SessionAnalyzer::measure(StepVisit& visit) const {
+  constexpr Tick kLate = 200;  // [ticks] of running: several of its periods
+  const auto measured = session_.measures.find(visit.revision);
+  const Tick newest = measured == session_.measures.end() ? tickOf(visit.begin) : measured->second.tick;
+  const bool is_of_the_end = session_.clock.between(newest, tickOf(visit.end)) <= kLate;
+  if (measured != session_.measures.end() && is_of_the_end)
+    visit.error = measured->second.error;
+  else
+    visit.error = {kUnknown, kUnknown};
+  // the server counts contacts of the step's object alone, every tick
+  const auto counted = session_.contact_seconds.find(visit.revision);
+  if (counted != session_.contact_seconds.end()) visit.metrics.contact_seconds = counted->second;
+  if (!is_of_the_end) visit.metrics.contact_seconds = kUnknown;
+}
+
 void SessionAnalyzer::summarize() {
   analysis_.whole = metrics(0.0, analysis_.duration);
   if (!analysis_.visits.empty()) analysis_.whole.contact_seconds = 0.0;
   for (StepVisit& visit : analysis_.visits) {
     visit.metrics = metrics(visit.begin, visit.end);
     visit.seconds = secondsOf(session_.clock.between(tickOf(visit.begin), tickOf(visit.end)));
-    // the server counts contacts of the step's object alone, every tick
-    const auto counted = session_.contact_seconds.find(visit.revision);
-    if (counted != session_.contact_seconds.end()) visit.metrics.contact_seconds = counted->second;
+    measure(visit);
     analysis_.whole.contact_seconds += visit.metrics.contact_seconds;
-    if (const auto error = session_.errors.find(visit.revision); error != session_.errors.end())
-      visit.error = error->second;
     visit.path = pathOf(visit);
     visit.collisions = collisionsOf(visit);
     analysis_.path += visit.path;
-    analysis_.collisions += visit.collisions;
+    if (!visit.collisions) analysis_.collisions.reset();
+    if (analysis_.collisions) *analysis_.collisions += *visit.collisions;
   }
   std::vector<double> values;
   for (const SeriesPoint& point : analysis_.compute) values.push_back(point.value);

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,7 +14,8 @@
 
 namespace tenon::report {
 
-/// Metrics of a part of a session. Forces are those that the devices displayed on the trainee's hands.
+/// Metrics of a part of a session. Forces are those that the devices displayed on the trainee's hands. Not a
+/// number: samples that the metric rests on are missing.
 struct SessionMetrics {
   double peak_force = 0.0;       ///< [N]
   double mean_force = 0.0;       ///< [N] over the time in which the hand's object was in contact
@@ -31,15 +34,16 @@ struct StepVisit {
   std::string part;
   ObjectId object;
   StepPhase phase = StepPhase::kActive;
-  double begin = 0.0;    ///< [s]
-  double end = 0.0;      ///< [s]
-  double seconds = 0.0;  ///< [s] of the step's own time, without pauses and stops: StepClock
+  bool is_end_known = true;  ///< false: neither a message nor the log of events says how it ended
+  double begin = 0.0;        ///< [s]
+  double end = 0.0;          ///< [s]
+  double seconds = 0.0;      ///< [s] of the step's own time, without pauses and stops: StepClock
   SessionMetrics metrics;
-  std::uint32_t attempt = 1;  ///< of this step, counted from 1: a step can be repeated
-  double path = 0.0;          ///< [m] that the step's object was moved
-  int collisions = 0;         ///< contacts of the step's object that began, after 0.2 s without one
+  std::uint32_t attempt = 1;          ///< of this step, counted from 1: a step can be repeated
+  double path = 0.0;                  ///< [m] that the step's object was moved; not a number: as of metrics
+  std::optional<int> collisions = 0;  ///< contacts of the step's object that began, after 0.2 s without one
   bool has_target = false;
-  TargetError error;      ///< last measured
+  TargetError error;      ///< last measured; not a number: as of metrics
   TargetError tolerance;  ///< of the target
 };
 
@@ -48,7 +52,8 @@ struct StepVisit {
 /// Threads: one at a time. Real-time: no.
 struct SessionAnalysis {
   std::string file;
-  std::string problem;  ///< why the file is incomplete; empty: it is complete
+  std::string problem;  ///< why the file is incomplete, and what samples it lacks; empty: it is complete
+  std::map<std::string, SampleCount> missing;  ///< by topic, of those of which samples are missing
   std::string session;
   std::string title;
   std::int64_t began_ns = 0;  ///< [ns] since 1970
@@ -73,7 +78,7 @@ struct SessionAnalysis {
   double duration = 0.0;  ///< [s]
   SessionMetrics whole;
   double path = 0.0;                                                    ///< [m] of all steps
-  int collisions = 0;                                                   ///< of all steps
+  std::optional<int> collisions = 0;                                    ///< of all steps
   double compute_median = 0.0, compute_p99 = 0.0, compute_worst = 0.0;  ///< [s]
   std::uint64_t late_ticks = 0;
   std::uint64_t slow_writes = 0;     ///< of the server to the bus, of more than 5 ms

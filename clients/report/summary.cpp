@@ -1,9 +1,12 @@
 #include "clients/report/summary.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "idl/types/messages/timing.h"
 #include "idl/types/names.h"
 
 namespace tenon::report {
@@ -20,10 +23,19 @@ std::string padded(std::string text, std::size_t width) {
   return text;
 }
 
-std::string row(const SessionMetrics& metrics, const std::string& error, double path, int collisions) {
-  return fmt::format("{:>12} {:7.2f} {:10} {:8.1f} {:8.1f} {:9.1f}", error, path, collisions,
-                     metrics.peak_force, metrics.mean_force, metrics.contact_seconds);
+/// `value` [unit of the table]; blank where it is not known.
+std::string cell(double value, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "";
 }
+
+std::string row(const SessionMetrics& metrics, const std::string& error, double path,
+                const std::optional<int>& collisions) {
+  return fmt::format("{:>12} {:>7} {:>10} {:>8} {:>8} {:>9}", error, cell(path, 2),
+                     collisions ? std::to_string(*collisions) : "", cell(metrics.peak_force, 1),
+                     cell(metrics.mean_force, 1), cell(metrics.contact_seconds, 1));
+}
+
+nlohmann::json jsonOf(const std::optional<int>& count) { return count ? nlohmann::json(*count) : nullptr; }
 
 nlohmann::json jsonOf(const SessionMetrics& metrics) {
   return {{"peak_force", metrics.peak_force},
@@ -37,7 +49,7 @@ nlohmann::json jsonOf(const SessionMetrics& metrics) {
 }  // namespace
 
 std::string errorText(const StepVisit& visit) {
-  if (!visit.has_target) return "";
+  if (!visit.has_target || !std::isfinite(visit.error.position)) return "";
   return fmt::format("{:.2f} of {:.1f}", 1e3 * visit.error.position, 1e3 * visit.tolerance.position);
 }
 
@@ -45,8 +57,9 @@ std::string titleText(const StepVisit& visit) {
   return visit.attempt > 1 ? fmt::format("{} (attempt {})", visit.title, visit.attempt) : visit.title;
 }
 
-std::string_view phaseName(StepPhase phase) {
-  switch (phase) {
+std::string_view resultOf(const StepVisit& visit) {
+  if (!visit.is_end_known) return "not known";
+  switch (visit.phase) {
     case StepPhase::kWaiting:
       return "abandoned";
     case StepPhase::kActive:
@@ -78,16 +91,24 @@ std::string outcomeOf(const SessionAnalysis& analysis) {
 
 std::string linkText(const ForceLatency& latency) {
   const std::string text = fmt::format(
-      "jitter up to {:.1f} ms; lost: {:.2f} % of inputs, {:.2f} % of contacts; {:.2f} % of inputs "
-      "replaced, {:.2f} % of ticks without one; hands held still after {} ms of silence at most",
+      "jitter up to {:.1f} ms; lost: {:.2f} % of inputs, {:.2f} % of contacts; replaced by newer ones: "
+      "{:.2f} % of inputs, "
+      "{:.2f} % of contacts; {:.2f} % of ticks without an input; hands held still after {} ms of silence at "
+      "most",
       1e3 * latency.jitter, 1e2 * latency.inputs_lost, 1e2 * latency.answers_lost,
-      1e2 * latency.inputs_replaced, 1e2 * latency.ticks_without_input, latency.freeze_ticks);
+      1e2 * latency.inputs_replaced, 1e2 * latency.answers_replaced, 1e2 * latency.ticks_without_input,
+      latency.freeze_ticks);
+  const std::string far =
+      latency.guidance_alone > 0.0
+          ? fmt::format("; contacts were not felt for {:.0f} % of the time (more than {:.0f} ms one way)",
+                        1e2 * latency.guidance_alone, 1e3 * kLongestContactDelay)
+          : "";
   const std::string clock =
       latency.clock_known
           ? fmt::format("; round trip {:.1f} ms; the server's clock is {:.6f} s ahead, +-{:.1f} ms",
                         1e3 * latency.round_trip, latency.clock_offset, 1e3 * latency.clock_error)
           : "";
-  return fmt::format("{}{} ({})", text, clock, latency.who);
+  return fmt::format("{}{}{} ({})", text, far, clock, latency.who);
 }
 
 std::string summaryText(const SessionAnalysis& analysis) {
@@ -106,8 +127,7 @@ std::string summaryText(const SessionAnalysis& analysis) {
   for (std::size_t i = 0; i < analysis.visits.size(); ++i) {
     const StepVisit& visit = analysis.visits[i];
     text += fmt::format("{:3} {}  {:7.1f} {}  {}\n", i + 1, padded(titleText(visit), width), visit.seconds,
-                        row(visit.metrics, errorText(visit), visit.path, visit.collisions),
-                        phaseName(visit.phase));
+                        row(visit.metrics, errorText(visit), visit.path, visit.collisions), resultOf(visit));
   }
   text += fmt::format("    {}  {:7.1f} {}\n", padded("session", width), analysis.duration,
                       row(analysis.whole, "", analysis.path, analysis.collisions));
@@ -131,9 +151,12 @@ std::string summaryText(const SessionAnalysis& analysis) {
         1e3 * latency.p50, 1e3 * latency.p99, 1e3 * latency.max, 1e3 * latency.silence, latency.who);
   for (const ForceLatency& latency : analysis.force_latencies)
     text += fmt::format("link              {}\n", linkText(latency));
-  text += fmt::format("hand to part      at most {:.2f} mm; parts inside each other: at most {:.2f} mm\n",
-                      1e3 * analysis.whole.gap, 1e3 * analysis.whole.depth);
-  text += fmt::format("work of a pair    at most {:.0f} % of its limit\n", analysis.whole.load);
+  const auto known = [](double value, int digits) {
+    return std::isfinite(value) ? cell(value, digits) : std::string("(not known)");
+  };
+  text += fmt::format("hand to part      at most {} mm; parts inside each other: at most {} mm\n",
+                      known(1e3 * analysis.whole.gap, 2), known(1e3 * analysis.whole.depth, 2));
+  text += fmt::format("work of a pair    at most {} % of its limit\n", known(analysis.whole.load, 0));
   for (const std::string& aid : analysis.aids) text += fmt::format("aid               {}\n", aid);
   return text;
 }
@@ -154,7 +177,7 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
       {"steps_skipped", analysis.run.steps_skipped},
       {"steps_timed_out", analysis.run.steps_timed_out},
       {"path", analysis.path},
-      {"collisions", analysis.collisions},
+      {"collisions", jsonOf(analysis.collisions)},
       {"whole", jsonOf(analysis.whole)},
       {"compute_seconds",
        {{"median", analysis.compute_median}, {"p99", analysis.compute_p99}, {"max", analysis.compute_worst}}},
@@ -166,9 +189,12 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
       {"malformed_messages", analysis.malformed},
       {"aids", analysis.aids},
       {"people", nlohmann::json::array()},
+      {"missing_samples", nlohmann::json::object()},
       {"steps", nlohmann::json::array()},
       {"input_to_force_seconds", nlohmann::json::array()},
       {"events", nlohmann::json::array()}};
+  for (const auto& [topic, count] : analysis.missing)
+    all["missing_samples"][topic] = {{"missing", count.missing()}, {"published", count.published}};
   for (const SessionParticipant& participant : analysis.participants)
     all["people"].push_back({{"name", participant.name}, {"role", roleName(participant.role)}});
   for (const StepVisit& visit : analysis.visits) {
@@ -179,14 +205,14 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
     step["part"] = visit.part;
     step["attempt"] = visit.attempt;
     step["path"] = visit.path;
-    step["collisions"] = visit.collisions;
+    step["collisions"] = jsonOf(visit.collisions);
     if (visit.has_target) {
       step["position_error"] = visit.error.position;
       step["position_tolerance"] = visit.tolerance.position;
       step["angle_error"] = visit.error.angle;
       step["angle_tolerance"] = visit.tolerance.angle;
     }
-    step["phase"] = phaseName(visit.phase);
+    step["phase"] = resultOf(visit);
     step["begin"] = visit.begin;
     step["end"] = visit.end;
     step["seconds"] = visit.seconds;
@@ -203,6 +229,8 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
          {"inputs_lost", latency.inputs_lost},
          {"answers_lost", latency.answers_lost},
          {"inputs_replaced", latency.inputs_replaced},
+         {"answers_replaced", latency.answers_replaced},
+         {"guidance_alone", latency.guidance_alone},
          {"ticks_without_input", latency.ticks_without_input},
          {"freeze_ms", latency.freeze_ticks},
          {"round_trip", latency.clock_known ? nlohmann::json(latency.round_trip) : nlohmann::json()},

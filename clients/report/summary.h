@@ -16,7 +16,7 @@ namespace tenon::report {
 [[nodiscard]] std::string titleText(const StepVisit& visit);
 
 /// Result of a step in words.
-[[nodiscard]] std::string_view phaseName(StepPhase phase);
+[[nodiscard]] std::string_view resultOf(const StepVisit& visit);
 
 /// "succeeded", or how the run ended instead.
 [[nodiscard]] std::string outcomeOf(const SessionAnalysis& analysis);

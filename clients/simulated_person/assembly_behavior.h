@@ -22,7 +22,7 @@ struct MountTask {
   Vector3 centre = Vector3::Zero();            ///< [m] of that box, likewise
   ObjectId assistant;                          ///< the instructor's pointer; invalid when there is none
   Vector3 assistant_centre = Vector3::Zero();  ///< [m] of its bounding box, in its own frame
-  bool guided_by_contact = true;  ///< aims with an error and relies on contact; false: exactly, by sight
+  bool guided_by_contact = true;  ///< aims with an error and relies on contact; false: without an error
   bool misplaced = false;         ///< inserts at a wrong pose and does not search for the opening
 };
 
@@ -36,12 +36,18 @@ struct TouchTask {
 /// Behaviour of one hand of a simulated person: rest, touch an object and stay in touch, carry the held
 /// object to a target and insert it.
 ///
-/// Decides the intended hand pose I from delayed perception and from the displayed force; the actual pose
-/// follows from the simulated arm and the device. Up to the begin of the insertion the pose is corrected by
-/// sight, from then on a visible tilt only: the aim has a seeded error, and contact guides the part
-/// laterally. Insertion controls the force (a few newtons); when it stalls it searches in a small spiral,
-/// then retracts, aims again with a smaller error and retries. A part that is far beside its aim, as after a
-/// hand was frozen, is brought back and aligned by sight again.
+/// Decides the intended hand pose I from the exact poses of objects as they were a reaction time ago
+/// (DelayedPerception: no noise, no occlusion) and from the displayed force (low pass of 30 ms); the
+/// actual pose follows from the simulated arm and the device. The only error is that of
+/// the aim: a lateral and an angular one, drawn from the seed once for each mount.
+///
+/// Up to the begin of the insertion the object's exact delayed pose is brought to that aim, to a millimetre.
+/// From then on the part is guided laterally by contact; exact delayed poses still tell its depth, a tilt
+/// that the hand turns against, its orientation in a spiral search and, with a force at the seat, its lateral
+/// place, and whether it is far beside its aim. Insertion controls the force (a few newtons); when it stalls
+/// it searches in a small spiral, then retracts, aims again with a smaller error and retries. A part that is
+/// far beside its aim, as after a hand was frozen, is brought back and aligned again. Where contact does not
+/// guide (MountTask::guided_by_contact), exact delayed poses align it to the end.
 ///
 /// Threads: one. Real-time: everything but the constructor.
 class AssemblyBehavior {
@@ -87,7 +93,7 @@ class AssemblyBehavior {
   void travel(const HandPerception& hand, double dt) noexcept;
   /// Presses on the touched point, or probes another one; `dt` [s].
   void touchStep(const HandPerception& hand, double dt) noexcept;
-  /// Aligns by sight before the insertion; `dt` [s].
+  /// Aligns by the delayed pose before the insertion; `dt` [s].
   void align(const HandPerception& hand, const DelayedPerception& perception, double dt) noexcept;
   /// Pushes along the axis; `dt` [s].
   void insert(const HandPerception& hand, const DelayedPerception& perception, double dt) noexcept;

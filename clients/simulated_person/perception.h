@@ -21,7 +21,8 @@ struct HandPerception {
   bool indexing = false;           ///< C moves
 };
 
-/// Visual perception with a reaction delay: object poses as they were `delay_ticks` ago.
+/// Visual perception with a reaction delay: object poses as they were `delay_ticks` ago, otherwise exact, of
+/// hidden objects too.
 ///
 /// Threads: one. Real-time: everything but begin().
 class DelayedPerception {

@@ -29,8 +29,9 @@ struct TraineeHand {
 /// Simulated trainee: carries out the active step with the hand it names; the other hand returns to its home
 /// pose.
 ///
-/// Uses only what a person at the station perceives: object and target poses with a reaction delay, the
-/// instruction with its direction of approach, and the forces on both hands; no recorded solution.
+/// Uses object and target poses with a reaction delay, the instruction with its direction of approach, and
+/// the forces on both hands; no recorded solution. Sight is better than that of a person: the delayed poses
+/// are exact, see AssemblyBehavior.
 ///
 /// Threads: one. Real-time: step.
 class SimulatedTrainee {

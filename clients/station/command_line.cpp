@@ -1,5 +1,6 @@
 #include "clients/station/command_line.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -33,6 +34,7 @@ struct Typed {
   std::string role;
   std::vector<std::string> devices;
   std::vector<std::string> addresses;
+  std::vector<std::string> serials;
   std::vector<std::string> mountings;
   std::vector<std::string> hands;
   std::optional<std::string> tracker;
@@ -41,6 +43,7 @@ struct Typed {
   std::optional<std::string> person;
   simulated_person::PersonOptions simulated;
   bool dead_man = false;
+  bool self_paced = false;
   std::optional<std::string> name;
   haptic::StationProgramOptions program;
 };
@@ -82,6 +85,38 @@ class StationFile : public CLI::ConfigTOML {
   const CLI::App& app_;
 };
 
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == separator) {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+/// Of lists with commas in them, the names: also an empty one, which CLI11 would leave out at the end.
+std::vector<std::string> namesOf(const std::vector<std::string>& lists) {
+  std::vector<std::string> names;
+  for (const std::string& list : lists)
+    for (std::string& name : split(list, ',')) names.push_back(std::move(name));
+  return names;
+}
+
+/// A check of each name of a list.
+template <class Check>
+auto each(Check check) {
+  return [check](const std::string& list) {
+    for (const std::string& name : split(list, ',')) {
+      if (name.empty()) return "a name of '" + shortened(printable(list), 60) + "' is empty";
+      if (const std::string wrong = check(name); !wrong.empty()) return wrong;
+    }
+    return std::string();
+  };
+}
+
 /// A check of a name: what is wrong with it, or nothing.
 template <class Check>
 auto named(Check check) {
@@ -104,20 +139,23 @@ void declareStation(CLI::App& app, Typed& typed) {
          "--device", typed.devices,
          "devices of the catalog, in the order of their hands (trainee: hug-sim, instructor: sigma7-sim)")
       ->option_text("NAME[,NAME]")
-      ->delimiter(',')
-      ->check(named(devices::findDevice));
+      ->check(each(named(devices::findDevice)));
   app.add_option(
          "--hands", typed.hands,
          "the scenario's hands that the devices' arms move, of two arms the right one first (trainee: "
          "right,left, instructor: instructor)")
       ->option_text("NAME[,NAME]")
-      ->delimiter(',')
-      ->check([](const std::string& name) {
+      ->check(each([](const std::string& name) {
         const auto permitted = wire::checkHandName(name);
         return permitted ? std::string() : permitted.error().what;
-      });
+      }));
   app.add_option("--address", typed.addresses, "where each device is: a port, host or socket")
       ->option_text("ADDRESS[,ADDRESS]")
+      ->delimiter(',');
+  app.add_option("--serial", typed.serials,
+                 "serial number of each device, where there are several of a kind (default: the first ones "
+                 "found)")
+      ->option_text("NUMBER[,NUMBER]")
       ->delimiter(',');
   app.add_option(
          "--mounting", typed.mountings,
@@ -153,6 +191,8 @@ void declarePerson(CLI::App& app, Typed& typed) {
       ->option_text("N [-1]");
   app.add_flag("--dead-man", typed.dead_man,
                "simulated devices have a dead man's switch, which their simulated person presses");
+  app.add_flag("--self-paced", typed.self_paced,
+               "simulated devices have clocks of their own: the first one paces the loop");
   app.add_flag("--arm", typed.program.armed,
                "the devices may display forces at once: the person is at the station");
 }
@@ -199,18 +239,6 @@ void declareProgram(CLI::App& app, Typed& typed) {
       "servers)");
 }
 
-std::vector<std::string> split(const std::string& text, char separator) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == separator) {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
-
 Result<Quaternion> parseMounting(const std::string& text) {
   double w = 0.0, x = 0.0, y = 0.0, z = 0.0;
   char more = 0;
@@ -242,13 +270,18 @@ Result<void> setRemoteAddresses(StationOptions& station) {
 /// The devices with what each is opened with.
 Result<void> setDevices(const Typed& typed, StationOptions& station) {
   const auto tooMany = [&](const auto& list) { return list.size() > typed.devices.size(); };
-  if (tooMany(typed.addresses) || tooMany(typed.mountings))
-    return fail("--address, --mounting: expected one for each --device at most");
+  if (tooMany(typed.addresses) || tooMany(typed.serials) || tooMany(typed.mountings))
+    return fail("--address, --serial, --mounting: expected one for each --device at most");
   if (!typed.devices.empty()) station.devices.clear();
   for (std::size_t i = 0; i < typed.devices.size(); ++i) {
     StationDevice device{typed.devices[i], {}};
     device.configuration.seed = typed.simulated.seed + i;
     if (i < typed.addresses.size()) device.configuration.address = typed.addresses[i];
+    if (i < typed.serials.size()) device.configuration.serial = typed.serials[i];
+    if (const auto facts = devices::findDevice(device.name);
+        facts && facts->serials == nullptr && !device.configuration.serial.empty())
+      return fail("--serial " + device.configuration.serial + ": device '" + device.name +
+                  "' has no serial number");
     if (i < typed.mountings.size()) {
       if (device.name == devices::kRemoteHand)
         return fail("--mounting: a remote hand's program turns its poses itself");
@@ -258,21 +291,31 @@ Result<void> setDevices(const Typed& typed, StationOptions& station) {
     }
     station.devices.push_back(std::move(device));
   }
-  for (StationDevice& device : station.devices) device.configuration.dead_man = typed.dead_man;
+  for (StationDevice& device : station.devices) {
+    device.configuration.dead_man = typed.dead_man;
+    device.configuration.paces = typed.self_paced;
+  }
   station.hands = typed.hands;
   return setRemoteAddresses(station);
 }
 
-/// Whether hands fit the arms of the devices; what is not of the catalog is not counted.
-Result<void> checkHands(const StationOptions& station) {
+/// What is not of the catalog is not counted.
+std::size_t armsOf(const StationOptions& station) {
   std::size_t arms = 0;
+  for (const StationDevice& device : station.devices)
+    if (const auto facts = devices::findDevice(device.name)) arms += facts->arms;
+  return arms;
+}
+
+/// Whether hands fit the arms of the devices.
+Result<void> checkHands(const StationOptions& station) {
   for (const StationDevice& device : station.devices) {
     const auto facts = devices::findDevice(device.name);
     if (!facts) return fail("--device: " + facts.error().what);
     if (facts->arms == 0)
       return fail("--device " + device.name + ": moves no hand; expected a device with an arm");
-    arms += facts->arms;
   }
+  const std::size_t arms = armsOf(station);
   const std::set<std::string> names(station.hands.begin(), station.hands.end());
   if (names.size() != station.hands.size()) return fail("--hands: a name is given twice");
   if (names.contains("")) return fail("--hands: a name is empty");
@@ -291,26 +334,48 @@ bool allSimulated(const StationOptions& station) {
   return true;
 }
 
-/// Reads the files of `--person`.
+/// "FILE" or "HAND=FILE", of a station with these hands; `moved`: those that have a file already.
+Result<HandScript> scriptOf(const std::string& text, const std::vector<std::string>& hands,
+                            std::set<std::string>& moved) {
+  const std::size_t equals = text.find('=');
+  HandScript script;
+  if (equals != std::string::npos) script.hand = text.substr(0, equals);
+  const bool is_known =
+      script.hand.empty() || std::find(hands.begin(), hands.end(), script.hand) != hands.end();
+  if (!is_known)
+    return fail(fmt::format("--person {}: this station has no hand '{}'; it has: {}", text, script.hand,
+                            fmt::join(hands, ", ")));
+  if (equals == 0 || text.empty())
+    return fail(fmt::format("--person '{}': expected [HAND=]FILE.csv; this station has the hands: {}", text,
+                            fmt::join(hands, ", ")));
+  // a file without a hand moves the first one
+  const std::string& hand = script.hand.empty() ? hands.front() : script.hand;
+  if (!moved.insert(hand).second)
+    return fail(fmt::format("--person {}: another file moves hand '{}' already", text, hand));
+  return script;
+}
+
+/// Reads the files of `--person`, when all of it is understood.
 Result<void> setPerson(const Typed& typed, StationOptions& station) {
   const std::string person = typed.person.value_or(allSimulated(station) ? "simulated" : "none");
   station.kind = person == "none" ? PersonKind::kNone : PersonKind::kSimulated;
   if (person == "none" || person == "simulated") return {};
   station.kind = PersonKind::kScript;
-  const std::size_t arms = 2 * station.devices.size();
   const std::vector<std::string> hands =
-      station.hands.empty() ? defaultHands(station.role, arms) : station.hands;
-  for (const std::string& text : split(person, ',')) {
-    const std::size_t equals = text.find('=');
-    HandScript script;
-    if (equals != std::string::npos) script.hand = text.substr(0, equals);
-    if (!script.hand.empty() && std::find(hands.begin(), hands.end(), script.hand) == hands.end())
-      return fail(fmt::format("--person {}: this station has no hand '{}'; it has: {}", text, script.hand,
-                              fmt::join(hands, ", ")));
-    auto trajectory = HandTrajectory::read(equals == std::string::npos ? text : text.substr(equals + 1));
+      station.hands.empty() ? defaultHands(station.role, armsOf(station)) : station.hands;
+  std::set<std::string> moved;
+  const std::vector<std::string> texts = split(person, ',');
+  for (const std::string& text : texts) {
+    auto script = scriptOf(text, hands, moved);
+    if (!script) return fail(script.error().what);
+    station.scripts.push_back(std::move(*script));
+  }
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    const std::size_t equals = texts[i].find('=');
+    auto trajectory =
+        HandTrajectory::read(equals == std::string::npos ? texts[i] : texts[i].substr(equals + 1));
     if (!trajectory) return fail("--person: " + trajectory.error().what);
-    script.trajectory = std::move(*trajectory);
-    station.scripts.push_back(std::move(script));
+    station.scripts[i].trajectory = std::move(*trajectory);
   }
   return {};
 }
@@ -334,6 +399,8 @@ Result<void> setTracking(const Typed& typed, StationOptions& station) {
 }
 
 Result<JoinArguments> join(Typed& typed) {
+  typed.devices = namesOf(typed.devices);
+  typed.hands = namesOf(typed.hands);
   const Role role = typed.role == "instructor" ? Role::kInstructor : Role::kTrainee;
   JoinArguments arguments{defaultStation(role, typed.simulated), typed.program};
   if (auto set = setDevices(typed, arguments.station); !set) return fail(set.error().what);

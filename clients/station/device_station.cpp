@@ -1,31 +1,16 @@
 #include "clients/station/device_station.h"
 
 #include <algorithm>
-#include <array>
-#include <optional>
 #include <utility>
 
-#include "clients/haptic/bracelet.h"
 #include "clients/haptic/haptic_hand.h"
 #include "clients/simulated_person/people.h"
-#include "clients/simulated_person/posture.h"
-#include "clients/station/tracked_input.h"
-#include "devices/mounted_device.h"
-#include "devices/simulated/body_tracker.h"
+#include "clients/station/tracked_person.h"
 #include "devices/simulated/simulated_device.h"
 
 namespace tenon::station {
 
 namespace {
-using devices::TrackedBody;
-
-struct TrackedHand {
-  TrackedBody body;
-  const char* name;  // of its hand
-};
-constexpr std::array kTracked{TrackedHand{TrackedBody::kForearm, "forearm"},
-                              TrackedHand{TrackedBody::kHead, "head"}};
-
 /// Where the hand `index` starts: at the object that it moves at first, else at a fixed place.
 Pose startOf(std::span<const SceneObject> objects, ObjectId moved, std::size_t index) {
   const auto found = std::find_if(objects.begin(), objects.end(),
@@ -34,23 +19,12 @@ Pose startOf(std::span<const SceneObject> objects, ObjectId moved, std::size_t i
                                      : Vector3(index == 1 ? -0.3 : 0.3, -0.35, 1.0));
 }
 
-// [ticks] of a body part's inputs: it feels vibrations, and moves nothing that a hand holds
-constexpr std::uint8_t kTrackedPeriod = 4;
-
-/// A device of the catalog; its arms share a clutch.
-struct OpenDevice {
-  std::unique_ptr<devices::HapticDevice> one;
-  std::unique_ptr<devices::BimanualDevice> pair;
-  std::unique_ptr<devices::ClutchLatch> clutch = std::make_unique<devices::ClutchLatch>();
-};
-
 /// An arm of a device, and the hand that it moves.
-struct Arm {
-  devices::HapticDevice* device = nullptr;
-  devices::ClutchLatch* clutch = nullptr;
-  Quaternion q_DM;  // of its mounting
+struct Arm : StationArm {
   std::unique_ptr<haptic::HapticHand> hand;
-  bool pressed = false;  // a button that arms was down in the last step
+  bool pressed = false;             // a button that arms was down in the last step
+  bool has_copy = false;            // of the scene, the hand
+  devices::MotorThermalModel heat;  // when its last hand ended
 };
 }  // namespace
 
@@ -58,29 +32,32 @@ struct DeviceStation::Parts {
   explicit Parts(const StationOptions& station) : options(station) {}
 
   StationOptions options;
-  std::vector<OpenDevice> devices;
+  StationArms devices;
   std::vector<Arm> arms;
-  std::shared_ptr<const simulation::Scene> scene;  // of the force model `scene copy`; null: not there
+  haptic::SceneCopies copies;  // that no hand has taken
   haptic::ForceModelKind force_model = haptic::ForceModelKind::kManifold;
   std::unique_ptr<haptic::Mover> mover;
   std::vector<haptic::MovedHand> moved;  // of each arm
 
-  std::unique_ptr<devices::Tracker> tracker;
-  std::unique_ptr<devices::HapticDevice> tactors;
-  std::array<DeviceInput, kTracked.size()> tracked{};
-  std::optional<haptic::Bracelet> bracelet;
-  simulated_person::Posture posture{1.0};
+  std::unique_ptr<TrackedPerson> tracked;  // null: there is no tracker
 
-  void addDevice(OpenDevice device, const Quaternion& q_DM) {
-    devices::ClutchLatch* const clutch = device.clutch.get();
-    const auto add = [&](devices::HapticDevice& arm) { arms.push_back({&arm, clutch, q_DM, {}, false}); };
-    if (device.pair) {
-      add(device.pair->right());
-      add(device.pair->left());
-    } else {
-      add(*device.one);
-    }
-    devices.push_back(std::move(device));
+  /// What displays something and is to be armed: each hand, and the bracelet.
+  template <class Do>
+  void forEachGuarded(const Do& apply) {
+    for (Arm& arm : arms)
+      if (arm.hand) apply(static_cast<haptic::GuardedDevice&>(*arm.hand));
+    if (tracked && tracked->bracelet() != nullptr) apply(*tracked->bracelet());
+  }
+  /// Index of the arm whose device paces; arms.size(): none does.
+  [[nodiscard]] std::size_t pacer() const {
+    const auto paces = [](const Arm& arm) { return arm.device->paces(); };
+    return static_cast<std::size_t>(std::find_if(arms.begin(), arms.end(), paces) - arms.begin());
+  }
+  void giveCopy(Arm& arm) {
+    if (!arm.hand || arm.has_copy || copies.empty()) return;
+    arm.hand->setCopy(std::move(copies.back()));
+    copies.pop_back();
+    arm.has_copy = true;
   }
   [[nodiscard]] bool faulty() const {
     for (const Arm& arm : arms) {
@@ -116,17 +93,11 @@ DeviceStation::DeviceStation(std::unique_ptr<Parts> parts) : parts_(std::move(pa
 DeviceStation::~DeviceStation() { end(); }
 
 void DeviceStation::end() noexcept {
-  for (Arm& arm : parts_->arms) {
-    if (arm.hand) arm.hand->end();
-  }
-  if (parts_->bracelet) parts_->bracelet->end();
+  parts_->forEachGuarded([](haptic::GuardedDevice& device) { device.end(); });
 }
 
 void DeviceStation::finish(bool disarms) noexcept {
-  for (Arm& arm : parts_->arms) {
-    if (arm.hand) arm.hand->finish(disarms);
-  }
-  if (parts_->bracelet) parts_->bracelet->finish(disarms);
+  parts_->forEachGuarded([disarms](haptic::GuardedDevice& device) { device.finish(disarms); });
 }
 
 /// The bracelet is silent after one step.
@@ -145,46 +116,20 @@ Result<std::unique_ptr<DeviceStation>> DeviceStation::open(const StationOptions&
 
 Result<void> DeviceStation::openDevices() {
   StationOptions& options = parts_->options;
-  for (const StationDevice& device : options.devices) {
-    if (device.opened) {
-      OpenDevice open;
-      open.one = std::make_unique<devices::MountedDevice>(*device.opened, device.configuration.q_DM);
-      parts_->addDevice(std::move(open), device.configuration.q_DM);
-      continue;
-    }
-    const auto facts = devices::findDevice(device.name);
-    if (!facts) return fail(facts.error().what);
-    if (facts->arms == 0) return fail("device '" + device.name + "' moves no hand");
-    if (!facts->simulated && options.kind != PersonKind::kNone)
-      return fail("device '" + device.name + "' is moved by its owner: expected --person none with it");
-    OpenDevice open;
-    if (facts->arms == 2) {
-      auto pair = devices::openBimanualDevice(device.name, device.configuration);
-      if (!pair) return fail(pair.error().what);
-      open.pair = std::move(*pair);
-    } else {
-      auto one = devices::openDevice(device.name, device.configuration);
-      if (!one) return fail(one.error().what);
-      open.one = std::move(*one);
-    }
-    parts_->addDevice(std::move(open), device.configuration.q_DM);
-  }
+  auto opened = parts_->devices.open(options.devices, options.kind == PersonKind::kNone);
+  if (!opened) return opened;
+  for (const StationArm& arm : parts_->devices.all()) parts_->arms.push_back({arm, {}});
   const std::size_t arms = parts_->arms.size();
   if (options.hands.empty()) options.hands = defaultHands(options.role, arms);
-  const std::size_t bodies = options.tracker.empty() ? 0 : kTracked.size();
+  const std::size_t bodies = options.tracker.empty() ? 0 : TrackedPerson::kBodies;
   if (options.hands.size() != arms || arms == 0 || arms + bodies > haptic::kMaxStationHands)
     return fail("the devices have " + std::to_string(arms) + " arms for " +
                 std::to_string(options.hands.size()) + " hands; expected as many, and " +
                 std::to_string(haptic::kMaxStationHands - bodies) + " at most");
-  if (!options.tracker.empty()) {
-    auto tracker = devices::openTracker(options.tracker, {.seed = options.person.seed});
-    if (!tracker) return fail(tracker.error().what);
-    parts_->tracker = std::move(*tracker);
-  }
-  if (options.tactors.empty()) return {};
-  auto tactors = devices::openDevice(options.tactors, {.seed = options.person.seed});
-  if (!tactors) return fail(tactors.error().what);
-  parts_->tactors = std::move(*tactors);
+  if (options.tracker.empty()) return {};
+  auto tracked = TrackedPerson::open(options.tracker, options.tactors, options.tactile, options.person.seed);
+  if (!tracked) return fail(tracked.error().what);
+  parts_->tracked = std::move(*tracked);
   return {};
 }
 
@@ -201,8 +146,8 @@ void DeviceStation::makeMover() {
 
 std::vector<std::string> DeviceStation::handNames() const {
   std::vector<std::string> names = parts_->options.hands;
-  if (parts_->tracker) {
-    for (const TrackedHand& tracked : kTracked) names.emplace_back(tracked.name);
+  if (parts_->tracked) {
+    for (std::string& name : TrackedPerson::handNames()) names.push_back(std::move(name));
   }
   return names;
 }
@@ -215,11 +160,18 @@ std::vector<HandStiffness> DeviceStation::stiffness() const {
 
 Role DeviceStation::role() const { return parts_->options.role; }
 
+bool DeviceStation::hasArmingButton() const {
+  return std::any_of(parts_->arms.begin(), parts_->arms.end(),
+                     [](const Arm& arm) { return arm.device->caps().arming != 0; });
+}
+
+bool DeviceStation::pressesItself() const { return parts_->mover != nullptr; }
+
 std::vector<haptic::HandDevice> DeviceStation::handDevices() const {
   std::vector<haptic::HandDevice> all;
   for (std::size_t i = 0; i < parts_->arms.size(); ++i) {
     const devices::DeviceCaps& caps = parts_->arms[i].device->caps();
-    all.push_back({parts_->options.hands[i], caps.model, caps.workspace_radius});
+    all.push_back({parts_->options.hands[i], caps.model, caps.serial, caps.workspace_radius});
   }
   return all;
 }
@@ -229,16 +181,19 @@ void DeviceStation::beginHand(std::size_t index, HandId id) {
   haptic::MovedHand& moved = parts_->moved[index];
   // of an earlier seat, in case this one is without that hand
   if (arm.hand && !id.valid()) arm.hand->end();
+  if (arm.hand) arm.heat = arm.hand->heat();
   arm.hand.reset();
+  arm.has_copy = false;
   moved.hand = nullptr;
   moved.intent = {};
   moved.X_WStart = startOf(sceneObjects(), handObject(index), index);
   if (!id.valid()) return;
-  arm.hand = std::make_unique<haptic::HapticHand>(*arm.device, arm.clutch);
+  arm.hand = std::make_unique<haptic::HapticHand>(*arm.device, arm.clutch, arm.heat);
   haptic::HapticHand& hand = *arm.hand;
-  hand.setScene(parts_->scene);
+  parts_->giveCopy(arm);
   hand.setForceModel(parts_->force_model);
   hand.begin(id, client_, moved.X_WStart.translation(), arming().permitsForces());
+  if (arming().stopped()) hand.permitForces(false);
   moved.hand = &hand;
   moved.X_WStart = hand.pose();
   // who has held the button all along does not press it
@@ -248,25 +203,13 @@ void DeviceStation::beginHand(std::size_t index, HandId id) {
 void DeviceStation::begin(std::span<const HandId> hand_ids) {
   const std::size_t arms = parts_->arms.size();
   for (std::size_t i = 0; i < arms; ++i) beginHand(i, hand_ids[i]);
-  for (std::size_t i = 0; parts_->tracker && i < kTracked.size(); ++i) {
-    parts_->tracked[i] = {};
-    parts_->tracked[i].hand = hand_ids[arms + i];
-    parts_->tracked[i].client = client_;
-  }
-  parts_->bracelet.reset();
-  if (parts_->tracker && parts_->tactors) {
-    haptic::Bracelet& bracelet =
-        parts_->bracelet.emplace(*parts_->tactors, haptic::TactileOptions{parts_->options.tactile});
-    // the session continues without vibration when the bracelet cannot be armed
-    bracelet.begin(hand_ids[arms], arming().permitsForces());
-  }
+  if (parts_->tracked) parts_->tracked->begin(hand_ids.subspan(arms), client_, arming().permitsForces());
   if (parts_->mover) parts_->mover->begin(sceneObjects(), parts_->moved);
 }
 
-void DeviceStation::setScene(const std::shared_ptr<const simulation::Scene>& scene) {
-  parts_->scene = scene;
-  for (Arm& arm : parts_->arms)
-    if (arm.hand) arm.hand->setScene(scene);
+void DeviceStation::setCopies(haptic::SceneCopies&& copies) {
+  parts_->copies = std::move(copies);
+  for (Arm& arm : parts_->arms) parts_->giveCopy(arm);
 }
 
 haptic::ForceModelKind DeviceStation::forceModel() const noexcept { return parts_->force_model; }
@@ -286,7 +229,7 @@ void DeviceStation::manifoldReceived(const HandManifold& manifold) noexcept {
   for (Arm& arm : parts_->arms) {
     if (arm.hand && arm.hand->id() == manifold.hand) arm.hand->receive(manifold);
   }
-  if (parts_->bracelet) parts_->bracelet->receive(manifold);
+  if (parts_->tracked) parts_->tracked->receive(manifold);
 }
 
 void DeviceStation::guidanceReceived(const Guidance& guidance) noexcept {
@@ -303,29 +246,37 @@ void DeviceStation::armingChanged() noexcept {
   for (Arm& arm : parts_->arms) {
     if (arm.hand) arm.hand->permitForces(arming().permitsForces());
   }
-  if (parts_->bracelet) parts_->bracelet->permit(arming().permitsForces());
+  if (parts_->tracked) parts_->tracked->permit(arming().permitsForces());
 }
 
 Result<void> DeviceStation::armDevices() {
   Result<void> all;
-  const auto keepFirst = [&all](Result<void> one) {
+  parts_->forEachGuarded([&all](haptic::GuardedDevice& device) {
+    auto one = device.armDevice();
     if (all && !one) all = std::move(one);
-  };
-  for (Arm& arm : parts_->arms) {
-    if (arm.hand) keepFirst(arm.hand->armDevice());
-  }
-  if (parts_->bracelet) keepFirst(parts_->bracelet->armDevice());
-  for (Arm& arm : parts_->arms) {
-    if (arm.hand) arm.hand->handBack();
-  }
-  if (parts_->bracelet) parts_->bracelet->handBack();
+  });
+  parts_->forEachGuarded([](haptic::GuardedDevice& device) { device.handBack(); });
   return all;
 }
 
 bool DeviceStation::wantsArming() const noexcept {
-  const auto wants = [](const Arm& arm) { return arm.hand && arm.hand->wantsArming(); };
-  return std::any_of(parts_->arms.begin(), parts_->arms.end(), wants) ||
-         (parts_->bracelet && parts_->bracelet->wantsArming());
+  bool wants = false;
+  parts_->forEachGuarded(
+      [&wants](const haptic::GuardedDevice& device) { wants = wants || device.wantsArming(); });
+  return wants;
+}
+
+std::string DeviceStation::pacedBy() const {
+  const std::size_t pacer = parts_->pacer();
+  return pacer < parts_->arms.size() ? "the device of hand " + parts_->options.hands[pacer] : "";
+}
+
+bool DeviceStation::awaitReading(std::chrono::nanoseconds longest) noexcept {
+  const std::size_t pacer = parts_->pacer();
+  if (pacer >= parts_->arms.size()) return false;
+  const Arm& arm = parts_->arms[pacer];
+  // without a hand nobody reads it, and while it is armed it is another thread's
+  return arm.hand && !arm.hand->wantsArming() && arm.device->awaitReading(longest);
 }
 
 void DeviceStation::step(std::uint32_t seq) noexcept {
@@ -343,7 +294,7 @@ void DeviceStation::step(std::uint32_t seq) noexcept {
     states_.push_back(arm.hand->state());
   }
   if (parts_->mover) moveArms();
-  if (parts_->tracker) trackBody(seq);
+  if (parts_->tracked) parts_->tracked->step(seq, dt_, firstHand(), world_.serverEpoch(), inputs_, states_);
 }
 
 void DeviceStation::pressButtons() noexcept {
@@ -371,42 +322,10 @@ void DeviceStation::moveArms() noexcept {
   }
 }
 
-void DeviceStation::trackBody(std::uint32_t seq) noexcept {
-  const auto& arms = parts_->arms;
-  const auto wears = [](const Arm& arm) { return arm.hand != nullptr; };
-  const auto wearing_arm = std::find_if(arms.begin(), arms.end(), wears);
-  const haptic::HapticHand* const wearer = wearing_arm == arms.end() ? nullptr : wearing_arm->hand.get();
-  devices::BodyTracker* const simulated = devices::simulatedBodyTracker(*parts_->tracker);
-  if (simulated != nullptr && wearer != nullptr) {
-    parts_->posture.step(wearer->pose(), wearer->state().p_WC, kTickSeconds);
-    simulated->place(TrackedBody::kForearm, parts_->posture.forearm());
-    simulated->place(TrackedBody::kHead, parts_->posture.head());
-  }
-  if (parts_->bracelet) parts_->bracelet->step(seq, dt_);
-  for (std::size_t i = 0; i < kTracked.size(); ++i) {
-    DeviceInput& input = parts_->tracked[i];
-    devices::TrackerReading reading;
-    parts_->tracker->read(kTracked[i].body, reading);
-    if (!input.hand.valid()) continue;
-    if (reading.visible) {
-      setTrackedPose(input, reading.X_TB, kTickSeconds);
-    } else {
-      input.active = false;
-      input.sample.V_WH = {};
-    }
-    input.sample.seq = seq;
-    input.period = kTrackedPeriod;
-    input.server_epoch = world_.serverEpoch();
-    inputs_.push_back(input);
-    HandState state;
-    state.hand = input.hand;
-    state.seq = seq;
-    state.X_WH = state.X_WO_local = input.sample.X_WH;
-    if (wearer != nullptr) state.p_WC = wearer->state().p_WC;
-    if (kTracked[i].body == TrackedBody::kForearm && parts_->bracelet)
-      state.tactors = parts_->bracelet->intensities();
-    states_.push_back(state);
-  }
+const haptic::HapticHand* DeviceStation::firstHand() const noexcept {
+  for (const Arm& arm : parts_->arms)
+    if (arm.hand) return arm.hand.get();
+  return nullptr;
 }
 
 const char* DeviceStation::activity() const noexcept {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include "clients/haptic/tactile_map.h"
 #include "clients/simulated_person/person.h"
 #include "clients/station/script_mover.h"
+#include "clients/station/station_arms.h"
 #include "devices/catalog.h"
 #include "idl/types/result.h"
 
@@ -20,13 +22,6 @@ enum class PersonKind {
   kSimulated,
   kScript,  ///< arms follow files
   kNone,    ///< who holds the devices
-};
-
-struct StationDevice {
-  std::string name;  ///< in the catalog, with one arm or two
-  devices::DeviceConfiguration configuration;
-  /// One arm that is not of the catalog, moved by its owner; null: it is.
-  std::shared_ptr<devices::HapticDevice> opened;
 };
 
 /// A station: hands x devices x trackers, and who moves it.
@@ -62,9 +57,14 @@ class DeviceStation : public haptic::Station {
   [[nodiscard]] std::vector<std::string> handNames() const override;
   [[nodiscard]] std::vector<HandStiffness> stiffness() const override;
   [[nodiscard]] Role role() const override;
+  [[nodiscard]] bool hasArmingButton() const override;
+  [[nodiscard]] bool pressesItself() const override;
   [[nodiscard]] std::vector<haptic::HandDevice> handDevices() const override;
+  /// The first device that does.
+  [[nodiscard]] std::string pacedBy() const override;
+  [[nodiscard]] bool awaitReading(std::chrono::nanoseconds longest) noexcept override;
   void step(std::uint32_t seq) noexcept override;
-  void setScene(const std::shared_ptr<const simulation::Scene>& scene) override;
+  void setCopies(haptic::SceneCopies&& copies) override;
   void setForceModel(haptic::ForceModelKind kind) noexcept override;
   [[nodiscard]] haptic::ForceModelKind forceModel() const noexcept override;
   using haptic::Station::receive;
@@ -94,8 +94,8 @@ class DeviceStation : public haptic::Station {
   /// Presses when a simulated person would, or a device's own button says so.
   void pressButtons() noexcept;
   void moveArms() noexcept;
-  /// Poses of forearm and head, and the vibration of the bracelet.
-  void trackBody(std::uint32_t seq) noexcept;
+  /// The hand by which the person stands; null: there is none.
+  [[nodiscard]] const haptic::HapticHand* firstHand() const noexcept;
   std::unique_ptr<Parts> parts_;
 };
 

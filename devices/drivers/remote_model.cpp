@@ -67,6 +67,7 @@ Result<void> RemoteModel::resetFault() {
 void RemoteModel::meetPeer() noexcept {
   has_peer_ = true;
   silence_ = 0;
+  awaits_release_ = true;
   target_ = {};
   target_.X_DT = state_.X_DH;
 }
@@ -79,6 +80,7 @@ void RemoteModel::losePeer() noexcept {
 void RemoteModel::lead(const RemoteTarget& target) noexcept {
   target_ = target;
   silence_ = 0;
+  if ((target.buttons & caps_.arming) == 0) awaits_release_ = false;
   state_.stamp = std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
@@ -110,9 +112,12 @@ void RemoteModel::read(DeviceState& state) noexcept {
   }
   receive();
   if (has_peer_ && ++silence_ > limits_.gone) giveUp();
-  if (!has_peer_ || silence_ >= limits_.silent) target_.buttons = 0;
+  if (!has_peer_ || silence_ >= limits_.silent) {
+    target_.buttons = 0;
+    awaits_release_ = true;
+  }
   follow();
-  state_.buttons = target_.buttons;
+  state_.buttons = target_.buttons & ~(awaits_release_ ? caps_.arming : 0U);
   state_.grip = target_.grip;
   state = state_;
 }

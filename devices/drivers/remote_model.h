@@ -20,7 +20,9 @@ struct RemoteLimits {
 ///
 /// No force is displayed: the peer is shown proxy, force and contact in each cycle. The hand goes to the
 /// newest target at up to 0.8 m/s and 6 rad/s. A peer that is silent has released its buttons, so its dead
-/// man's switch, and the hand stands still; after RemoteLimits::gone it is given up.
+/// man's switch, and the hand stands still; after RemoteLimits::gone it is given up. An arming button that is
+/// down in a peer's first message, or when the peer is heard again, is not pressed: it has to be seen up
+/// first.
 ///
 /// Threads, Real-time: as HapticDevice.
 class RemoteModel : public HapticDevice {
@@ -58,7 +60,8 @@ class RemoteModel : public HapticDevice {
   DeviceCaps caps_;
   RemoteLimits limits_;
   bool has_peer_ = false;
-  unsigned silence_ = 0;  ///< [cycles] since the last target
+  unsigned silence_ = 0;        ///< [cycles] since the last target
+  bool awaits_release_ = true;  ///< of the arming button, which was not heard of yet, or for a while
   unsigned cycles_since_write_ = 0;
   RemoteTarget target_;
   DeviceState state_;

@@ -137,6 +137,7 @@ void SimulatedDevice::fault(DeviceFault why) noexcept {
 bool SimulatedDevice::rotates() const noexcept { return model_.caps.dof_mask != kTranslationDofs; }
 
 void SimulatedDevice::read(DeviceState& state) noexcept {
+  if (clock_) clock_->taken();
   if (phase_ != Phase::kClosed) {
     ++state_.seq;
     checkWatchdog();
@@ -268,6 +269,15 @@ void SimulatedDevice::sense() noexcept {
     const Vector3 error = kForceNoise * Vector3(noise(), noise(), noise());
     state_.F_Ho_D_measured = {arm_.handleWrench().force + error, arm_.handleWrench().torque};
   }
+}
+
+std::vector<std::string> simulatedSerials() { return {"1001", "1002", "1003", "1004"}; }
+
+std::uint64_t unitSeed(std::uint64_t seed, const std::string& serial) {
+  constexpr std::uint64_t kApart = 1'000'003;
+  const std::vector<std::string> units = simulatedSerials();
+  const auto unit = std::find(units.begin(), units.end(), serial);
+  return seed + (unit == units.end() ? 0 : kApart * static_cast<std::uint64_t>(unit - units.begin()));
 }
 
 }  // namespace tenon::devices

@@ -3,8 +3,13 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "devices/device.h"
+#include "devices/simulated/device_clock.h"
 #include "devices/simulated/human_arm.h"
 #include "idl/types/random.h"
 
@@ -37,9 +42,9 @@ struct MagneticClutch {
 /// simulated arm that holds the handle.
 ///
 /// Each read() advances time by 1 ms with the newest command held, as in a sampled-data loop, so that an
-/// unstable force law is unstable here, too. No clock is read; random numbers (friction of this device
-/// within 10 % of the make's, noise of the force sensor) come from the seed, so a session repeats bit by bit.
-/// Gravity is compensated.
+/// unstable force law is unstable here, too. No clock is read but by awaitReading(); random numbers (friction
+/// of this device within 10 % of the make's, noise of the force sensor) come from the seed, so a session
+/// repeats bit by bit. Gravity is compensated.
 ///
 /// Threads: one servo thread, also for humanArm(). Real-time: read, write, disarm and all of humanArm().
 class SimulatedDevice : public HapticDevice {
@@ -64,11 +69,20 @@ class SimulatedDevice : public HapticDevice {
   void close() noexcept;
   /// Gives it a dead man's switch, which the arm presses by HumanArm::setButtons.
   void addDeadManSwitch() noexcept { model_.caps.dead_man = kDeadManButton; }
+  /// Gives it a clock of its own, which runs by `clock` and paces the loop.
+  void addClock(std::shared_ptr<threads::Clock> clock, std::uint64_t seed) {
+    clock_.emplace(std::move(clock), seed);
+  }
+  void setSerial(std::string serial) { model_.caps.serial = std::move(serial); }
 
   [[nodiscard]] const DeviceCaps& caps() const override { return model_.caps; }
   [[nodiscard]] Result<void> arm() override;
   void disarm() noexcept override;
   [[nodiscard]] Result<void> resetFault() override;
+  [[nodiscard]] bool paces() const noexcept override { return clock_.has_value(); }
+  [[nodiscard]] bool awaitReading(std::chrono::nanoseconds longest) noexcept override {
+    return clock_ && phase_ != Phase::kClosed && clock_->await(longest);
+  }
   void read(DeviceState& state) noexcept override;
   void write(const DeviceCommand& command) noexcept override;
 
@@ -100,6 +114,7 @@ class SimulatedDevice : public HapticDevice {
   std::shared_ptr<MagneticClutch> clutch_;
   std::uint32_t clutch_openings_seen_ = 0;
   Random random_;
+  std::optional<DeviceClock> clock_;
   Phase phase_ = Phase::kClosed;
   DeviceState state_;
   bool braked_ = false;
@@ -112,6 +127,11 @@ class SimulatedDevice : public HapticDevice {
   std::array<Wrench, kLongestDelay + 1> commands_{};  ///< delay line, by tick modulo its size
   std::array<Pose, kLongestWindow + 1> readings_{};   ///< past poses, likewise
 };
+
+/// Serial numbers of the simulated devices of each make that there are: units of one make differ in friction.
+[[nodiscard]] std::vector<std::string> simulatedSerials();
+/// Of the unit `serial`; empty: the first one. Precondition: there is one.
+[[nodiscard]] std::uint64_t unitSeed(std::uint64_t seed, const std::string& serial);
 
 /// The simulated arm that holds `device`; null if there is none.
 [[nodiscard]] inline HumanArm* simulatedHumanArm(HapticDevice& device) noexcept {

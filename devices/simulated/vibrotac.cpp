@@ -1,9 +1,12 @@
 #include "devices/simulated/vibrotac.h"
 
+#include <utility>
+
 namespace tenon::devices {
 
-Vibrotac::Vibrotac() {
+Vibrotac::Vibrotac(std::string serial) {
   caps_.model = "VibroTac (simulated)";
+  caps_.serial = std::move(serial);
   caps_.rate = 1000.0 / kTicksPerCommand;
   caps_.tactors = 6;
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include "devices/device.h"
 
@@ -21,7 +22,7 @@ class Vibrotac : public HapticDevice {
   /// [ticks] without a write until the motors stop.
   static constexpr unsigned kWatchdog = 100;
 
-  Vibrotac();
+  explicit Vibrotac(std::string serial = {});
 
   [[nodiscard]] const DeviceCaps& caps() const override { return caps_; }
   [[nodiscard]] Result<void> arm() override;

@@ -60,15 +60,24 @@ void CyclicThread::schedule() {
   if (options_.prepare) add(options_.prepare());
 }
 
+bool CyclicThread::awaitEvent(Nanoseconds due, bool has_come) const noexcept {
+  if (!options_.await) return false;
+  const Nanoseconds until = due + (has_come ? kPatience : 0) * options_.period;
+  return options_.await(std::max(Nanoseconds::zero(), until - clock_->now()));
+}
+
 void CyclicThread::loop() noexcept {
   const Nanoseconds period = options_.period;
   Nanoseconds due = clock_->now() + period;
+  bool has_come = true;
   std::uint64_t tick = 0;
   while (!stopping_.load(std::memory_order_acquire)) {
-    clock_->sleepUntil(due, stopping_);
+    has_come = awaitEvent(due, has_come);
+    const Nanoseconds earliest = has_come ? due - period / 4 : due;
+    if (!has_come || clock_->now() < earliest) clock_->sleepUntil(earliest, stopping_);
     const Nanoseconds now = clock_->now();
-    if (now < due) continue;
-    const Nanoseconds delay = now - due;
+    if (now < earliest) continue;
+    const Nanoseconds delay = std::max(Nanoseconds::zero(), now - due);
     if (delay.count() > worst_delay_.load(std::memory_order_relaxed)) {
       worst_delay_.store(delay.count(), std::memory_order_relaxed);
     }
@@ -76,8 +85,8 @@ void CyclicThread::loop() noexcept {
     function_(tick);
     ++tick;
     ticks_.store(tick, std::memory_order_relaxed);
-    // the next due time of the same grid; missed periods are skipped
-    due += period * (1 + delay / period);
+    // of the clock's grid, the next due time: missed periods are skipped
+    due = has_come ? now + period : due + period * (1 + delay / period);
   }
 }
 

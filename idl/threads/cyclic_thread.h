@@ -20,12 +20,21 @@ struct CyclicOptions {
   /// Called once on the thread, when its scheduling is set and before its first tick; may be empty. Returns
   /// what the operating system did not grant, for notGranted().
   std::function<std::string()> prepare;
+  /// What paces the ticks, as a device by its readings; empty: the clock alone. Waits for its next event,
+  /// `longest` at most, and returns whether there is one; false at once where none can come.
+  std::function<bool(Nanoseconds longest)> await;
 };
 
 /// Calls a function periodically at fixed times of a clock.
 ///
 /// A tick that starts a period or more after its due time is late and counted; missed periods are skipped and
-/// not caught up, because a device must not get several steps at once. Scheduling that the operating system
+/// not caught up, because a device must not get several steps at once.
+///
+/// With CyclicOptions::await a tick begins when the event has come, not before three quarters of a period.
+/// One that is late is waited for kPatience periods more; from then on the clock paces, until there is one
+/// again.
+///
+/// Scheduling that the operating system
 /// does not grant (real-time priority, CPU) is reported by notGranted(), and the thread runs without it.
 ///
 /// Threads: start, stop and the destructor from one thread; counters from any.
@@ -33,6 +42,7 @@ struct CyclicOptions {
 class CyclicThread {
  public:
   using Function = std::function<void(std::uint64_t tick)>;
+  static constexpr int kPatience = 2;  ///< [periods]
 
   CyclicThread(std::shared_ptr<Clock> clock, CyclicOptions options, Function function);
   ~CyclicThread();
@@ -56,6 +66,8 @@ class CyclicThread {
  private:
   void schedule();
   void loop() noexcept;
+  /// For the tick that is due at `due`. `has_come`: the last one began with an event.
+  [[nodiscard]] bool awaitEvent(Nanoseconds due, bool has_come) const noexcept;
 
   std::shared_ptr<Clock> clock_;
   CyclicOptions options_;

@@ -1,55 +1,63 @@
 #include "idl/types/stop_truth.h"
 
+#include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace tenon {
 namespace {
 
+/// Whether `kept` has this raise, or a later one of its client.
 template <class M>
-std::size_t countOf(const std::map<RaiseId, M>& kept, const std::string& client_guid) {
-  std::size_t count = 0;
-  for (auto at = kept.lower_bound({client_guid, 0}); at != kept.end() && at->first.client_guid == client_guid;
-       ++at)
-    ++count;
-  return count;
-}
-
-/// What has to go for `newest`, which is in `kept`: the lowest counter of its client, or the first of all;
-/// none within the bounds.
-template <class M>
-std::optional<RaiseId> surplus(const std::map<RaiseId, M>& kept, const RaiseId& newest) {
-  const auto otherThanNewest = [&](auto at) { return at->first == newest ? std::next(at) : at; };
-  if (countOf(kept, newest.client_guid) > StopTruth::kMostOfClient)
-    return otherThanNewest(kept.lower_bound({newest.client_guid, 0}))->first;
-  if (kept.size() > StopTruth::kMostInAll) return otherThanNewest(kept.begin())->first;
-  return std::nullopt;
+bool reaches(const std::map<std::string, M>& kept, const EmergencyStop& raise) {
+  const auto found = kept.find(raise.client_guid);
+  return found != kept.end() && found->second.counter >= raise.counter;
 }
 
 }  // namespace
 
+bool StopTruth::stands(const EmergencyStop& stop) const { return reaches(standing_, stop); }
+
+bool StopTruth::wasCleared(const EmergencyStop& stop) const { return reaches(cleared_, stop); }
+
+std::uint32_t StopTruth::newestOf(const std::string& client_guid) const {
+  const auto raise = standing_.find(client_guid);
+  const auto clear = cleared_.find(client_guid);
+  return std::max(raise == standing_.end() ? 0 : raise->second.counter,
+                  clear == cleared_.end() ? 0 : clear->second.counter);
+}
+
 StopChange StopTruth::raise(const EmergencyStop& stop) {
-  const RaiseId id{stop.client_guid, stop.counter};
-  if (cleared_.contains(id) || standing_.contains(id)) return {};
+  if (wasCleared(stop) || stands(stop)) return {};
   ++raised_;
   StopChange change{.changed = true};
-  const bool is_full =
-      standing_.size() >= kMostInAll || countOf(standing_, stop.client_guid) >= kMostOfClient;
-  if (is_full) {
-    change.superfluous = {id.client_guid, id.counter, stop.who, "other raises stand"};
-    change.forgotten = clear(*change.superfluous).forgotten;
+  if (const auto former = standing_.find(stop.client_guid); former != standing_.end()) {
+    change.ended = std::exchange(former->second, stop);
+  } else if (standing_.size() < kMostClients) {
+    standing_.emplace(stop.client_guid, stop);
   } else {
-    standing_.emplace(id, stop);
+    change.superfluous = {stop.client_guid, stop.counter, stop.who, "other raises stand"};
+    change.forgotten = clear(*change.superfluous).forgotten;
   }
   return change;
 }
 
 StopChange StopTruth::clear(const EmergencyClear& cleared) {
-  const RaiseId id{cleared.client_guid, cleared.counter};
-  standing_.erase(id);
-  if (!cleared_.emplace(id, cleared).second) return {};
+  const auto known = cleared_.find(cleared.client_guid);
+  if (known != cleared_.end() && known->second.counter >= cleared.counter) return {};
   StopChange change{.changed = true};
-  change.forgotten = surplus(cleared_, id);
-  if (change.forgotten) cleared_.erase(*change.forgotten);
+  if (const auto raise = standing_.find(cleared.client_guid);
+      raise != standing_.end() && raise->second.counter <= cleared.counter)
+    change.ended = std::move(standing_.extract(raise).mapped());
+  if (known != cleared_.end()) {
+    change.forgotten = std::exchange(known->second, cleared);
+  } else {
+    const auto newest = cleared_.emplace(cleared.client_guid, cleared).first;
+    if (cleared_.size() > kMostClients) {
+      const auto surplus = newest == cleared_.begin() ? std::next(newest) : cleared_.begin();
+      change.forgotten = std::move(cleared_.extract(surplus).mapped());
+    }
+  }
   return change;
 }
 

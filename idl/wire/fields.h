@@ -189,6 +189,7 @@ void fields(auto& d, auto& c, Is<HandManifold> auto& m) {
   d("hand", c.hand_id, m.hand);
   d("server_epoch", c.server_epoch, m.server_epoch);
   d("tick", c.tick, m.tick);
+  d("sent", c.sent, m.sent);
   d("answers_seq", c.answers_seq, m.answers_seq);
   d("object", c.object_id, m.object);
   d("object_epoch", c.object_epoch, m.object_epoch);
@@ -295,7 +296,9 @@ void fields(auto& d, auto& c, Is<Telemetry> auto& m) {
   d("age", c.age, m.age);
   d("jitter", c.jitter, m.jitter);
   d("answers_lost", c.answers_lost, m.answers_lost);
+  d("answers_replaced", c.answers_replaced, m.answers_replaced);
   d("inputs_lost", c.inputs_lost, m.inputs_lost);
+  d("guidance_alone", c.guidance_alone, m.guidance_alone);
   d("clock_known", c.clock_known, m.clock_known);
   d("clock_offset", c.clock_offset, m.clock_offset);
   d("clock_error", c.clock_error, m.clock_error);
@@ -321,6 +324,7 @@ void fields(auto& d, auto& c, Is<SceneHand> auto& m) {
   d("object", c.object_id, m.object);
   d("freeze_ticks", c.freeze_ticks, m.limits.freeze_ticks);
   d("park_ticks", c.park_ticks, m.limits.park_ticks);
+  d("guidance_alone", c.guidance_alone, m.guidance_alone);
 }
 void fields(auto& d, auto& c, Is<SceneStep> auto& m) {
   d("step", c.step, m.step);
@@ -328,6 +332,11 @@ void fields(auto& d, auto& c, Is<SceneStep> auto& m) {
   d("name", c.name, m.name);
   d.list("title", c.title, m.title, 3, kStructs);
   d("part", c.part, m.part);
+}
+void fields(auto& d, auto& c, Is<SceneTitle> auto& m) { d.list("titles", c.titles, m.titles, 3, kStructs); }
+void fields(auto& d, auto& c, Is<SceneSignal> auto& m) {
+  d("signal", c.signal, m.signal);
+  d("name", c.name, m.name);
 }
 void fields(auto& d, auto& c, Is<ObjectSnapshot> auto& m) {
   d("tick", c.tick, m.tick);

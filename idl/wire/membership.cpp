@@ -6,6 +6,8 @@
 #include <thread>
 #include <utility>
 
+#include "idl/wire/network.h"
+
 namespace tenon::wire {
 namespace {
 
@@ -25,6 +27,24 @@ std::string randomGuid() {
 
 std::string sessionText(const std::string& session) {
   return session.empty() ? "a session" : "session '" + session + "'";
+}
+
+/// Where and with what remedy no server was found: the network decides it.
+std::string notFoundText(const MembershipOptions& options) {
+  const std::string within = " within " + std::to_string(options.timeout.count()) + " s: ";
+  const auto network = chosenNetwork();
+  if (!network || network->reach == Reach::kConfig)
+    return " by CYCLONEDDS_URI" + within + "start one with `tenon serve`, by the same configuration";
+  const std::string where = " on the network '" + network->text + "'" + within;
+  if (network->reach == Reach::kLoopback)
+    return where + "start one with `tenon serve`; one on another machine: choose its network (--network)";
+  std::string peers;
+  for (const std::string& peer : network->peers) peers += (peers.empty() ? "" : " and ") + peer;
+  return where + (peers.empty() ? "no peers are named" : "is it at " + peers) +
+         (peers.empty() ? "; start one with `tenon serve --network "
+                        : "? Start one there with `tenon serve --network ") +
+         (network->reach == Reach::kWan ? "wan" : "lan") + "`, or check the link with `tenon doctor --peer " +
+         (network->peers.empty() ? "HOST" : network->peers.front()) + "`";
 }
 
 /// Polls `done`; false when it is not true within `timeout` or `stop` is set.
@@ -100,8 +120,7 @@ Result<SessionAnnounce> Membership::awaitAnnounce(const Stop& stop, const std::f
   if (!found && stop) return fail("stopped while looking for " + sessionText(options_.session));
   if (!found) {
     return fail("no server announced " + sessionText(options_.session) + " on domain " +
-                std::to_string(options_.domain) + " within " + std::to_string(options_.timeout.count()) +
-                " s: start one with `tenon serve`");
+                std::to_string(options_.domain) + notFoundText(options_));
   }
   if (announce.protocol_version != kProtocolVersion) {
     return fail("the server has protocol version " + std::to_string(announce.protocol_version) +
@@ -268,7 +287,7 @@ const std::optional<std::string>& Membership::lost() {
 }
 
 Result<void> Membership::rejoin(const Stop& stop, const std::function<void()>& meanwhile) {
-  if (is_displaced_) return fail("its work goes on there");
+  if (is_displaced_) return fail("this one ends");
   const SessionAnnounce before = announce_;
   const auto until = std::chrono::steady_clock::now() + options_.timeout;
   while (true) {

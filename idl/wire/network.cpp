@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <memory>
 #include <optional>
+#include <regex>
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
@@ -83,6 +84,28 @@ std::optional<std::string> resolve(const std::string& host) {
   return textOf(reinterpret_cast<const sockaddr_in*>(found->ai_addr)->sin_addr);
 }
 
+/// The address of the peer that `word` names; fails with why it cannot be one.
+Result<std::string> peerAddress(const std::string& word) {
+  in_addr address{};
+  const bool is_number = word.find_first_not_of("0123456789.") == std::string::npos;
+  if (is_number && inet_pton(AF_INET, word.c_str(), &address) != 1)
+    return fail("'" + word + "' is no IPv4 address: four numbers, as in 10.0.0.5");
+  const auto text = resolve(word);
+  if (!text)
+    return fail("'" + word + "' has no IPv4 address: mistyped, or not known to this machine's name service");
+  inet_pton(AF_INET, text->c_str(), &address);
+  const std::uint32_t first = ntohl(address.s_addr) >> 24U;
+  if (first == 127)
+    return fail("'" + word + "' means loopback (" + *text +
+                "), which is this machine: leave it out, programs of one machine know each other; for a "
+                "session on this machine alone: --network loopback");
+  if (first == 0 || first >= 224)
+    return fail("'" + word + "' is no address of a machine: " +
+                (first >= 224 && first < 240 ? "multicast groups are Tenon's own (--network lan)"
+                                             : "name a host, as in 10.0.0.5"));
+  return *text;
+}
+
 std::vector<std::string> wordsOf(std::string_view text) {
   std::vector<std::string> words(1);
   for (const char letter : text) {
@@ -153,10 +176,8 @@ Result<Network> findNetwork(std::string_view text) {
     return network;
   }
   for (const std::string& word : words) {
-    const auto address = resolve(word);
-    if (!address)
-      return fail("network '" + network.text + "': the peer '" + word +
-                  "' has no IPv4 address: mistyped, or not known to this machine's name service");
+    const auto address = peerAddress(word);
+    if (!address) return fail("network '" + network.text + "': the peer " + address.error().what);
     network.peers.push_back(*address);
   }
   const bool is_named = first != "lan" && first != "wan";
@@ -173,9 +194,22 @@ Result<Network> findNetwork(std::string_view text) {
   return network;
 }
 
+Result<void> checkAgainstUri(const Network& network) {
+  const char* const uri = environmentText("CYCLONEDDS_URI");
+  if (uri == nullptr || network.reach == Reach::kLoopback) return {};
+  static const std::regex kLoopback(
+      R"(<NetworkInterface(\s[^>]*\b(name|address)\s*=\s*["'](lo|127\.[0-9.]*)["']|Address>\s*(lo|127\.[0-9.]*)\s*<))");
+  if (!std::regex_search(uri, kLoopback)) return {};
+  return fail(
+      "network '" + network.text +
+      "': CYCLONEDDS_URI names the interface of loopback, which reaches no other machine: unset it, or "
+      "choose --network loopback");
+}
+
 Result<void> chooseNetwork(std::string_view text) {
   auto network = findNetwork(text);
   if (!network) return tl::unexpected(network.error());
+  if (auto checked = checkAgainstUri(*network); !checked) return checked;
   choice() = std::move(*network);
   return {};
 }
@@ -185,6 +219,8 @@ Result<Network> chosenNetwork() {
   if (const char* text = environmentText("TENON_NETWORK")) {
     auto network = findNetwork(text);
     if (!network) return fail("TENON_NETWORK: " + network.error().what);
+    if (auto checked = checkAgainstUri(*network); !checked)
+      return fail("TENON_NETWORK: " + checked.error().what);
     return network;
   }
   if (const char* uri = environmentText("CYCLONEDDS_URI")) return Network{Reach::kConfig, uri, {}, {}, {}};

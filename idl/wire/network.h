@@ -30,15 +30,21 @@ struct Network {
 /// `loopback`, `lan`, `wan`, or the name of an interface (lan if it can multicast, else wan, as WireGuard's),
 /// with peers behind it: `wan,server.example,10.0.0.7`. Without an interface: that of the route to the first
 /// peer; without peers that of the default route, or the only one. Fails with a sentence that names the
-/// choice and what to do: unknown interface, peer or word, no interface, peers of loopback.
+/// choice and what to do: unknown interface, peer or word, no interface, peers of loopback, a peer that is no
+/// other machine.
 [[nodiscard]] Result<Network> findNetwork(std::string_view text);
 
-/// Chooses the network of all participants that this process opens from now on; fails as findNetwork.
+/// Fails where CYCLONEDDS_URI, which prevails, names the interface of loopback for a network beyond it: DDS
+/// cannot send from there to another machine.
+[[nodiscard]] Result<void> checkAgainstUri(const Network& network);
+
+/// Chooses the network of all participants that this process opens from now on; fails as findNetwork and
+/// checkAgainstUri.
 /// DDS configures a domain once per process, so the choice comes before the first participant.
 /// Threads: one at a time, before others open participants.
 [[nodiscard]] Result<void> chooseNetwork(std::string_view text);
 
-/// What was chosen; else TENON_NETWORK; else CYCLONEDDS_URI as it is; else loopback. Fails as findNetwork.
+/// What was chosen; else TENON_NETWORK; else CYCLONEDDS_URI as it is; else loopback. Fails as chooseNetwork.
 [[nodiscard]] Result<Network> chosenNetwork();
 
 /// Configuration of Cyclone DDS for this network: its profile of deploy/dds, its interface and peers, and

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -20,6 +21,7 @@ namespace {
 
 struct Domain {
   dds_entity_t entity = 0;
+  std::string config;
   ~Domain() { dds_delete(entity); }
 };
 
@@ -62,26 +64,37 @@ Result<std::string> configText(const std::string& config) {
   return "file://" + path.string();
 }
 
-/// " on the network 'wan,10.0.0.5'": for what goes wrong on one that was chosen.
+/// " on the network 'wan,10.0.0.5'": for what goes wrong on one that was chosen. CYCLONEDDS_URI may be why.
 std::string ofNetwork(const LinkOptions& options) {
   const auto network = options.config.empty() ? chosenNetwork() : Result<Network>(Network{});
-  return network && !network->text.empty() ? " on the network '" + network->text + "'" : "";
+  if (!network || network->text.empty()) return "";
+  if (network->reach == Reach::kConfig) return " by CYCLONEDDS_URI, '" + network->text + "'";
+  const char* const uri = std::getenv("CYCLONEDDS_URI");
+  const std::string more =
+      uri != nullptr && *uri != '\0' ? " with CYCLONEDDS_URI, '" + std::string(uri) + "'" : "";
+  return " on the network '" + network->text + "'" + more;
 }
 
 Result<std::shared_ptr<void>> openDomain(const LinkOptions& options) {
   static std::mutex mutex;
   static std::map<std::uint32_t, std::weak_ptr<Domain>> open_domains;
   const std::lock_guard<std::mutex> lock(mutex);
-  if (auto domain = open_domains[options.domain].lock()) return domain;
+  auto domain = open_domains[options.domain].lock();
+  if (domain && options.config.empty()) return domain;
   const auto config = configText(options.config);
   if (!config) return tl::unexpected(config.error());
+  if (domain) {
+    if (domain->config == *config) return domain;
+    return fail("DDS domain " + std::to_string(options.domain) + " could not be opened" + ofNetwork(options) +
+                ": this process has it open with another configuration, and can have but one");
+  }
   const LogCapture log;
   const dds_entity_t entity = dds_create_domain(options.domain, config->c_str());
   if (entity < 0) {
     return fail("DDS domain " + std::to_string(options.domain) + " could not be opened" + ofNetwork(options) +
                 ": " + ddsReason(entity) + log.message());
   }
-  auto domain = std::make_shared<Domain>(entity);
+  domain = std::make_shared<Domain>(entity, *config);
   open_domains[options.domain] = domain;
   return domain;
 }

@@ -18,19 +18,21 @@ struct PartitionEntities;
 struct LinkOptions {
   std::uint32_t domain = 0;  ///< DDS domain
   LinkProfile profile = LinkProfile::kLan;
-  /// Cyclone DDS configuration: XML text or path of a file. Empty: that of chosenNetwork().
+  /// Cyclone DDS configuration: XML text or path of a file. Empty: that of this process's other participants
+  /// in the domain, or else of chosenNetwork().
   std::string config;
 };
 
 /// A DDS domain participant.
 ///
 /// All participants of one domain in one process use the configuration of the first, because DDS configures a
-/// domain once per process.
+/// domain once per process and ignores what a later one asks for: that is an error here.
 ///
 /// Threads: any. Real-time: no.
 class Participant {
  public:
-  /// Fails when the configuration is missing or wrong, or the domain cannot be joined.
+  /// Fails when the configuration is missing, wrong, or another one than the domain has in this process, or
+  /// the domain cannot be joined.
   static Result<std::shared_ptr<Participant>> open(const LinkOptions& options);
   ~Participant();
   Participant(const Participant&) = delete;

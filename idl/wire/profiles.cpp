@@ -10,16 +10,17 @@ constexpr std::uint32_t kLockstepDepth = 32;
 constexpr Milliseconds kLockstepLease{
     5000};  ///< long enough for a machine that is busy with many lockstep processes
 
-// longest time a reliable write blocks for a slow reader before it fails
-constexpr Milliseconds kLanBlocking{500};
-constexpr Milliseconds kServerBlocking{5};  // in the thread that receives from all clients, or writes to all
+// Longest time a reliable write blocks for a slow reader before it fails. Cyclone DDS blocks writers that
+// keep all, alone, while more than its WhcHigh is not acknowledged: 2 MB with the profiles in deploy/dds.
+constexpr Milliseconds kBlocking{5};  // in a thread that hears of stops, or receives from all clients
+constexpr Milliseconds kRequestBlocking{500};  // of who waits for the answer
 constexpr Milliseconds kLockstepBlocking{10000};
 
 dds_duration_t duration(Milliseconds time) { return DDS_MSECS(time.count()); }
 
 Milliseconds blockingTime(const TopicSpec& topic, LinkProfile profile) {
   if (profile == LinkProfile::kLockstep) return kLockstepBlocking;
-  return topic.parameters.of_server ? kServerBlocking : kLanBlocking;
+  return topic.parameters.request ? kRequestBlocking : kBlocking;
 }
 
 void setReliability(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {

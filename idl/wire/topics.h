@@ -42,6 +42,9 @@ struct TopicParameters {
   std::uint32_t reader_depth = 1;  ///< samples per key of a stream that a reader keeps until it takes them
   bool latched = false;            ///< instances outlive their writer
   bool of_server = false;  ///< a server alone writes it: Partition::hearOnly binds its readers to one server
+  /// Who writes it waits for the server's answer, and hears no stops in that thread: the write may wait
+  /// longer for a slow reader.
+  bool request = false;
 };
 
 /// A topic of messages M.

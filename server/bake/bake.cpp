@@ -10,6 +10,7 @@
 #include "server/bake/parallel.h"
 #include "server/bake/shell_bake.h"
 #include "server/bake/thin_places.h"
+#include "server/bake/valley_bake.h"
 #include "server/bake/welded_mesh.h"
 #include "server/structures/gap_note.h"
 
@@ -126,6 +127,10 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
   const ThinPlaces thin = findThinPlaces(undilated, baked->surface, baked->thin, work);
   if (work.cancelled()) return fail("cancelled");
   structures.field = structures::makeDilatedField(std::move(baked->storage), thin.dilations);
+  const auto valleys = findValleys(structures.field, *baked->surface_tree,
+                                   baked->mesh_tree ? &*baked->mesh_tree : nullptr, work);
+  if (work.cancelled()) return fail("cancelled");
+  structures.field = structures::withValleys(structures.field, valleys);
   info.thin_area = thin.area;
   info.open_area = thin.open_area;
   info.filled = std::move(baked->filled);

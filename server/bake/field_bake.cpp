@@ -264,6 +264,7 @@ Result<BakedField> bakeField(const WeldedMesh& mesh, const BakeOptions& options,
     limitSlope(*fine, &coarse, work);
   }
   baked.surface_tree = hidden.empty() ? std::move(tree) : std::move(*trees[1]);
+  if (!hidden.empty()) baked.mesh_tree = std::move(tree);
   baked.thin = thinBricks(coarse, work);
   if (fine) baked.thin.keepThoseOf(thin);
   baked.refined_gaps = std::move(refined.refined_gaps);

@@ -23,6 +23,7 @@ struct BakedField {
   structures::FieldStorage storage;           ///< of the field, without dilation
   std::vector<structures::Triangle> surface;  ///< the exposed part of the triangles
   std::optional<TriangleTree> surface_tree;   ///< of these
+  std::optional<TriangleTree> mesh_tree;      ///< of all triangles, where those are not all
   std::size_t hidden_triangles = 0;           ///< entirely inside the solid
   std::vector<structures::FilledSpace> filled;
   BrickMarks thin;                   ///< where material may be thin

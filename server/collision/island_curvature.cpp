@@ -19,6 +19,9 @@ constexpr double kSharpTurn = 0.1;
 /// [-] Where the field's slope is less, the gradient gives no plane.
 constexpr double kMinPlaneSlope = 0.3;
 
+/// [-] Planes whose normals have a larger cosine are one.
+constexpr double kOneNormal = 1.0 - 1e-6;
+
 /// A principal direction of a field's level set in which it is concave, as seen from outside.
 struct ConcaveDirection {
   Vector3 direction_W = Vector3::Zero();
@@ -26,7 +29,8 @@ struct ConcaveDirection {
 };
 
 /// The concave principal directions at a contact. Where the normal turns abruptly, the tangent planes to both
-/// sides are appended to `secondary_planes`: in a concave place they constrain the point as well.
+/// sides are appended to `secondary_planes`: in a concave place they constrain the point as well. Where the
+/// bake has found the planes there (DistanceField::planesAt) these are appended, and nothing is curved.
 FixedVector<ConcaveDirection, 2> concaveDirections(const ContactSurface& surface, const Contact& contact,
                                                    FixedVector<Contact, 4>& secondary_planes) {
   FixedVector<ConcaveDirection, 2> directions;
@@ -35,6 +39,17 @@ FixedVector<ConcaveDirection, 2> concaveDirections(const ContactSurface& surface
   const Vector3 p_BP = X_WB.inverse() * contact.p_WP;
   const Vector3 n_B = X_WB.rotation().conjugate() * (surface.sign * contact.n_W);
   const double h = kSampleOffset * surface.field->voxelAt(p_BP);
+  if (const auto planes = surface.field->planesAt(p_BP); !planes.empty()) {
+    const double dilation = surface.field->dilationBeyond(surface.most_dilation, p_BP);
+    for (const structures::ValleyPlane& known : planes) {
+      Contact plane = contact;
+      plane.gap = known.distance(p_BP - surface.field->layout().p_MoFo_M) + dilation;
+      plane.n_W = X_WB.rotation() * (surface.sign * known.n_M.cast<double>());
+      plane.area = 0.0;
+      if (plane.n_W.dot(contact.n_W) < kOneNormal) secondary_planes.push_back(plane);
+    }
+    return directions;
+  }
   const std::array<Vector3, 2> t = tangentsOf(n_B);
   Eigen::Matrix2d turn;
   for (int side = 0; side < 2; ++side) {

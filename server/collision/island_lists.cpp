@@ -185,6 +185,7 @@ void IslandSolver::buildConstraints(const Job& job) {
   }
   contact_row_count_ = rows_.size();
   std::fill_n(inside_cell_.begin(), contact_row_count_, std::uint8_t{0});
+  std::fill_n(released_.begin(), contact_row_count_, std::uint8_t{0});
 }
 
 std::size_t IslandSolver::pairOfRow(const Job& job, std::size_t row) {

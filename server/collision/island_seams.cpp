@@ -22,6 +22,9 @@ constexpr double kSeamDepthNoise = 1e-6;
 /// [-] Normals whose dot product is nearer to 1 are equal.
 constexpr double kSameNormal = 1e-9;
 
+/// [m] A contact that holds is released to a side that has more slack than this at the end of the step.
+constexpr double kReleaseSlack = 1e-6;
+
 /// [points of a traversal] that take as long as the planes beside a contact.
 constexpr std::uint64_t kBorderWork = 30;
 constexpr std::uint64_t kEdgeWork = 8;
@@ -134,23 +137,48 @@ bool IslandSolver::relaxSeamNormals(const Job& job, SeamKind kind, SolveReport& 
   // outside a convex surface, free space is the union of both half-spaces: the largest slack decides
   std::size_t unchanged = rows_.size();
   for (const Seam& seam : seams_) {
-    Contact& contact = job.results[seam.pair].query.contacts[seam.contact];
-    const Vector3 u_W = relativeDisplacement(job, step, job.pairs[seam.pair], contact.p_WP);
-    double largest_slack = contact.gap + contact.n_W.dot(u_W);
-    for (const ContactSide& side : seam.sides) {
-      const double slack = side.gap + side.n_W.dot(u_W);
-      if (slack <= largest_slack) continue;
-      largest_slack = slack;
-      contact.n_W = side.n_W;
-      contact.gap = side.gap;
-      unchanged = std::min(unchanged, seam.row);
-    }
-    rows_[seam.row].n_W = contact.n_W;
-    rows_[seam.row].gap = contact.gap;
+    if (released_[seam.row] != 0) continue;
+    if (takeSideWithSlack(job, seam, step, 0.0)) unchanged = std::min(unchanged, seam.row);
   }
-  if (unchanged == rows_.size()) return false;
+  if (unchanged == rows_.size()) return releaseSeams(job, report);
   active_.assign(active_without_seams.begin(), active_without_seams.end());
   std::sort(active_.begin(), active_.end());
+  solveQp(job, report, unchanged);
+  return true;
+}
+
+bool IslandSolver::takeSideWithSlack(const Job& job, const Seam& seam, std::span<const Displacement> step,
+                                     double least) {
+  Contact& contact = job.results[seam.pair].query.contacts[seam.contact];
+  const Vector3 u_W = relativeDisplacement(job, step, job.pairs[seam.pair], contact.p_WP);
+  double largest_slack = contact.gap + contact.n_W.dot(u_W) + least;
+  bool changed = false;
+  for (const ContactSide& side : seam.sides) {
+    const double slack = side.gap + side.n_W.dot(u_W);
+    if (slack <= largest_slack) continue;
+    largest_slack = slack;
+    contact.n_W = side.n_W;
+    contact.gap = side.gap;
+    changed = true;
+  }
+  rows_[seam.row].n_W = contact.n_W;
+  rows_[seam.row].gap = contact.gap;
+  return changed;
+}
+
+bool IslandSolver::releaseSeams(const Job& job, SolveReport& report) {
+  std::size_t unchanged = rows_.size();
+  const std::span<const Displacement> step(step_.data(), job.bodies.size());
+  for (const Seam& seam : seams_) {
+    if (multipliers_[seam.row] <= 0.0 || !takeSideWithSlack(job, seam, step, kReleaseSlack)) continue;
+    released_[seam.row] = 1;
+    unchanged = std::min(unchanged, seam.row);
+  }
+  if (unchanged == rows_.size()) return false;
+  const auto is_released = [this](std::uint32_t row) {
+    return row < contact_row_count_ && released_[row] != 0;
+  };
+  active_.erase(std::remove_if(active_.begin(), active_.end(), is_released), active_.end());
   solveQp(job, report, unchanged);
   return true;
 }

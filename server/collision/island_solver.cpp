@@ -69,6 +69,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
   carried_.reserve(active_.capacity());
   curvature_rows_.reserve(6 * max_bodies);
   inside_cell_.resize(multipliers_.size());
+  released_.resize(multipliers_.size());
 }
 
 SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs,

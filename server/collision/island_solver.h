@@ -265,6 +265,13 @@ class IslandSolver {
   /// Gives active contacts at seams the normal of the side that restricts the step least, and solves again.
   /// False when no normal changed.
   bool relaxSeamNormals(const Job& job, SeamKind kind, SolveReport& report);
+  /// Gives a contact at a seam the side with the largest slack at the end of `step`, if that is more than the
+  /// slack of its own by `least` [m]. True when it is another one.
+  bool takeSideWithSlack(const Job& job, const Seam& seam, std::span<const Displacement> step, double least);
+  /// A point that is outside of one side of a seam is not held by another: active contacts of seams_ that
+  /// have slack at another side at the end of step_ get that one, and step_ is solved again. step_ keeps all
+  /// constraints and one that held is gone, so the energy falls. False when there is none.
+  bool releaseSeams(const Job& job, SolveReport& report);
   /// Sets seams_: where an active contact is at a convex border between cells, or at an edge, all that touch
   /// at one. As far as there is capacity: the active ones first, then those with the smallest gaps.
   void findSeams(const Job& job, SeamKind kind, SolveReport& report);
@@ -322,6 +329,7 @@ class IslandSolver {
   std::size_t contact_row_count_ = 0;
   /// by row: at this iterate the contact was found to be at no border
   std::vector<std::uint8_t> inside_cell_;
+  std::vector<std::uint8_t> released_;  ///< by row: by releaseSeams at this iterate
   std::vector<ContactConstraint> rows_;
   std::vector<double> multipliers_;               ///< [N] by row
   std::vector<Displacement> step_;                ///< the QP's solution, by body

@@ -254,10 +254,9 @@ class Traversal {
 
   /// Valley correction of what is listed.
   void correctNearValleys() {
-    const double voxel = frame_.field.voxel();
     bool corrected = false;
     for (std::size_t i = 0; i < near_.count; ++i) {
-      if (!mayBeInValley(near_.gap[i], near_.gradient(i).squaredNorm(), voxel)) continue;
+      if (!mayBeInValley(frame_.field, near_.gap[i], near_.gradient(i).squaredNorm())) continue;
       structures::FieldSample sample{near_.gap[i], near_.gradient(i), true};
       if (!correctValley(frame_, kernels_, frame_.inB(Vector3(near_.x[i], near_.y[i], near_.z[i])), sample))
         continue;
@@ -385,11 +384,10 @@ namespace {
 /// Valley correction of a block of sampled points; false when there is none.
 bool correctValleys(const LaneFrame& frame, const QueryKernels& kernels, const structures::ShellBlock& points,
                     SampleLanes& samples) {
-  const double voxel = frame.field.voxel();
   bool corrected = false;
   forEachLane(samples.exact, [&](std::uint32_t i) {
     const Vector3 gradient(samples.gradient_x[i], samples.gradient_y[i], samples.gradient_z[i]);
-    if (!mayBeInValley(samples.distance[i], gradient.squaredNorm(), voxel)) return;
+    if (!mayBeInValley(frame.field, samples.distance[i], gradient.squaredNorm())) return;
     structures::FieldSample sample{samples.distance[i], gradient, true};
     if (!correctValley(frame, kernels, frame.inB(Vector3(points.x[i], points.y[i], points.z[i])), sample))
       return;

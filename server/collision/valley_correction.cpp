@@ -112,11 +112,28 @@ double interpolationError(const structures::FieldCell& cell, const Planes& plane
   return std::min(interpolated - planes[0].distance, 0.0);
 }
 
+/// A sample in a cell whose surface is known: the gap to the nearest plane, which also holds the point where
+/// it is behind more than one.
+structures::FieldSample nearestPlane(std::span<const structures::ValleyPlane> planes,
+                                     const Vector3& p_FoP_M) {
+  structures::FieldSample sample{kFarGap, Vector3::Zero(), true};
+  for (const structures::ValleyPlane& plane : planes) {
+    const double distance = plane.distance(p_FoP_M);
+    if (distance < sample.distance) sample = {distance, plane.n_M.cast<double>(), true};
+  }
+  return sample;
+}
+
 }  // namespace
 
 bool correctValley(const LaneFrame& frame, const QueryKernels& kernels, const Vector3& p_BP,
                    structures::FieldSample& sample) noexcept {
   const structures::DistanceField& field = frame.field;
+  if (const auto planes = field.planesAt(p_BP); !planes.empty()) {
+    sample = nearestPlane(planes, p_BP - field.layout().p_MoFo_M);
+    return true;
+  }
+  if (std::abs(sample.gradient.squaredNorm() - 1.0) <= kUnitSlope) return false;
   structures::FieldCell cell;
   if (!field.cellAt(p_BP, cell)) return false;
   const double interpolated = sample.distance / cell.voxel;
@@ -139,8 +156,7 @@ bool correctValley(const LaneFrame& frame, const QueryKernels& kernels, const Ve
 
 structures::FieldSample sampleInValley(const structures::DistanceField& field, const Vector3& p_MP) noexcept {
   structures::FieldSample sample = field.sample(p_MP);
-  if (!sample.exact || !mayBeInValley(sample.distance, sample.gradient.squaredNorm(), field.voxel()))
-    return sample;
+  if (!sample.exact || !mayBeInValley(field, sample.distance, sample.gradient.squaredNorm())) return sample;
   const LaneFrame frame(field, Pose(), Pose(), 0.0, 0.0);
   correctValley(frame, chosenKernels(), p_MP, sample);
   return sample;

@@ -16,6 +16,30 @@ double seconds(std::uint32_t ticks) noexcept { return ticks * kTickSeconds; }
 
 }  // namespace
 
+double limitOf(std::span<const Condition> tree, std::size_t node) noexcept {
+  const Condition& condition = tree[node];
+  switch (condition.kind) {
+    case ConditionKind::kPose:
+    case ConditionKind::kForceTarget:
+      return condition.within;
+    case ConditionKind::kForce:
+      return condition.above > 0.0 ? condition.above : condition.below;
+    case ConditionKind::kContact:
+    case ConditionKind::kContactTime:
+      return seconds(condition.limit_ticks);
+    case ConditionKind::kAll: {
+      double children = 0.0;
+      for (std::size_t i = node + 1; i < tree.size(); ++i) children += tree[i].parent == node ? 1.0 : 0.0;
+      return children;
+    }
+    case ConditionKind::kFulfilled:
+    case ConditionKind::kSignal:
+    case ConditionKind::kAny:
+      break;
+  }
+  return 1.0;
+}
+
 double angleBetween(const Quaternion& q_WA, const Quaternion& q_WB) noexcept {
   return logRotation(q_WB * q_WA.conjugate()).norm();
 }

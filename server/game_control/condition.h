@@ -91,6 +91,10 @@ struct ContactTimer {
   }
 };
 
+/// [unit of the reading's value] The limit of a node of the tree, which is known before it is evaluated: of a
+/// group how many of its children are to be met.
+[[nodiscard]] double limitOf(std::span<const Condition> tree, std::size_t node) noexcept;
+
 /// Evaluates one condition tree tick by tick. Its whole state is tick counters and the last readings, so a
 /// re-simulation decides the same.
 ///

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "server/game_control/text_limits.h"
+
 namespace tenon::game_control {
 namespace {
 
@@ -211,7 +213,7 @@ void ConditionReader::readCommand(const YAML::Node& node, Condition& /*condition
 }
 
 void ConditionReader::readSignal(const YAML::Node& node, Condition& condition) {
-  const std::string name = yaml_.text(node, "'signal'");
+  const std::string name = yaml_.text(node, "'signal'", kMaxSignalName);
   const auto found = std::find(signals_.begin(), signals_.end(), name);
   condition.signal = static_cast<std::uint32_t>(found - signals_.begin());
   if (found == signals_.end()) signals_.push_back(name);

@@ -88,7 +88,7 @@ StepProgress progress(const ScenarioFile& scenario, const StepStatus& status, Ti
     if (report.conditions.size() == kMostConditionsTold) continue;
     const ConditionReading& reading = status.conditions[i];
     report.conditions.push_back({textOf(scenario, condition), static_cast<float>(reading.value),
-                                 static_cast<float>(reading.limit), groupOf(condition.kind), reading.met,
+                                 static_cast<float>(limitOf(tree, i)), groupOf(condition.kind), reading.met,
                                  depth});
   }
   return report;

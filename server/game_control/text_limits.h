@@ -14,6 +14,7 @@ inline constexpr std::size_t kMaxLanguages = 3;      // of a text
 inline constexpr std::size_t kMaxObjectName = 63;    // [bytes]
 inline constexpr std::size_t kMaxHandName = 31;      // [bytes]
 inline constexpr std::size_t kMaxStateName = 47;     // [bytes] and of its part
+inline constexpr std::size_t kMaxSignalName = 255;   // [bytes] of an external signal
 inline constexpr std::size_t kMaxKind = 31;          // [bytes] of an object
 
 }  // namespace tenon::game_control

@@ -8,15 +8,15 @@ namespace {
 tl::expected<void, Refused> checkIn(RunPhase phase, RunPhase expected, bool is_stopped, CommandKind kind) {
   if (kind == CommandKind::kNote || kind == CommandKind::kKick) return {};
   if (isOver(phase)) return refuse(Refusal::kOver, "the run is over");
-  const bool in_any_phase = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
-                            kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop ||
-                            kind == CommandKind::kGuide;
+  const bool in_any_phase = kind == CommandKind::kSetCollision || kind == CommandKind::kStop ||
+                            kind == CommandKind::kClearEmergencyStop || kind == CommandKind::kGuide;
   if (in_any_phase) return {};
   if (phase == RunPhase::kWaitingForPeople)
     return refuse(Refusal::kWaiting, "the session still waits for people: repeat the command once it runs");
-  // a pause is what the clear of the stop leaves
-  if (is_stopped && kind != CommandKind::kPause && kind != CommandKind::kFreezeForces)
-    return refuse(Refusal::kStopped, "the emergency stop stands: clear it first");
+  // a pause is what the clear of the stop leaves; a hand may have to let go in a stop
+  const bool in_stop =
+      kind == CommandKind::kPause || kind == CommandKind::kFreezeForces || kind == CommandKind::kRelease;
+  if (is_stopped && !in_stop) return refuse(Refusal::kStopped, "the emergency stop stands: clear it first");
   const bool is_paused = expected == RunPhase::kPaused;
   if (kind == CommandKind::kResume && !is_paused)
     return refuse(Refusal::kAlready, "the session is not paused");

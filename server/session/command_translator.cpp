@@ -38,14 +38,24 @@ int CommandTranslator::findStep(std::string_view text) const {
   return is_step ? static_cast<int>(number) - 1 : -1;
 }
 
-/// Whether the client controls every force-coupled hand of the trainee.
-bool CommandTranslator::controlsBothHands(ClientId client, const CommandContext& context) const {
-  for (std::uint32_t i = 0; i < context.controllers.size(); ++i) {
+/// Of the two force-coupled hands of the trainee.
+CommandTranslator::Decision CommandTranslator::swapChange(const Command& command,
+                                                          const CommandContext& context) const {
+  std::size_t swappable = 0, own = 0;
+  for (std::uint32_t i = 0; i < scenario_.hands.size(); ++i) {
     const game_control::ScenarioHand& hand = scenario_.hands[i];
-    const bool swappable = hand.role == Role::kTrainee && hand.kind == simulation::HandKind::kCoupled;
-    if (swappable && !(client.valid() && context.controllers[i] == client)) return false;
+    if (hand.role != Role::kTrainee || hand.kind != simulation::HandKind::kCoupled) continue;
+    ++swappable;
+    if (command.client.valid() && context.controllers[i] == command.client) ++own;
   }
-  return true;
+  if (!has(context.role, Right::kActOnAnyHand) && own < swappable)
+    return refuse(Refusal::kNotYourHand, "you do not control both hands");
+  if (swappable != 2)
+    return refuse(
+        Refusal::kOther,
+        fmt::format("two hands are swapped, and the trainee of this scenario has {} that take parts",
+                    swappable));
+  return gameChange(command);
 }
 
 CommandTranslator::Decision CommandTranslator::changeFor(const Command& command,
@@ -64,9 +74,7 @@ CommandTranslator::Decision CommandTranslator::changeFor(const Command& command,
     case CommandKind::kRelease:
       return releaseChange(command, context);
     case CommandKind::kSwapHands:
-      if (!has(context.role, Right::kActOnAnyHand) && !controlsBothHands(command.client, context))
-        return refuse(Refusal::kNotYourHand, "you do not control both hands");
-      return gameChange(command);
+      return swapChange(command, context);
     case CommandKind::kClearEmergencyStop:
       return clearStopChange(command, context);
     default:
@@ -156,9 +164,12 @@ CommandTranslator::Decision CommandTranslator::leadChange(const Command& command
       return Change{.kind = ChangeKind::kStop};
     case CommandKind::kFreezeForces:
       return Change{.kind = ChangeKind::kFreezeForces, .value = command.value};
+    case CommandKind::kBack:
+      if (context.step == 0U)
+        return refuse(Refusal::kOther, "there is no step before the first one; `repeat` begins it anew");
+      return gameChange(command);
     case CommandKind::kReset:
     case CommandKind::kSkipStep:
-    case CommandKind::kBack:
     case CommandKind::kRepeatStep:
       return gameChange(command);
     case CommandKind::kGoToStep: {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -19,6 +21,7 @@ struct CommandContext {
   bool is_stop_engaged = false;           ///< emergency stop
   NewestRaise newest;                     ///< of it
   bool is_instructor_present = false;
+  std::optional<std::uint32_t> step;  ///< the current one, from 0; none: a command that waits may change it
 };
 
 /// What a command asks of the simulation, by the names of the scenario, of a sender whose role may send it
@@ -44,7 +47,7 @@ class CommandTranslator {
   [[nodiscard]] Decision clearStopChange(const Command& command, const CommandContext& context) const;
   [[nodiscard]] int findStep(std::string_view text) const;
   [[nodiscard]] int findPair(std::string_view a, std::string_view b) const;
-  [[nodiscard]] bool controlsBothHands(ClientId client, const CommandContext& context) const;
+  [[nodiscard]] Decision swapChange(const Command& command, const CommandContext& context) const;
 
   const game_control::ScenarioFile& scenario_;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -26,6 +27,8 @@ const char* endKind(StepPhase phase) {
       return nullptr;
   }
 }
+
+constexpr std::size_t kMostOfReason = 511;  ///< [bytes] of RunState in idl/tenon.idl
 
 std::string counted(std::uint32_t steps, std::string_view what) {
   return fmt::format(", {} step{} {}", steps, steps == 1 ? "" : "s", what);
@@ -96,10 +99,13 @@ void EventGenerator::addMatrix(const TickOutput& output, TickEvents& events) con
   }
 }
 
-RunState EventGenerator::runBefore(bool is_stopped) const {
+RunState EventGenerator::runBefore(bool is_stopped, const std::vector<std::string>& missing) const {
+  std::string waiting =
+      fmt::format("waiting for people{}{}", missing.empty() ? "" : ": ", fmt::join(missing, ", "));
+  if (waiting.size() > kMostOfReason) waiting = "waiting for people";
   return {.phase = RunPhase::kWaitingForPeople,
           .tick = tick_,
-          .reason = is_stopped ? "emergency stop" : "waiting for people",
+          .reason = is_stopped ? "emergency stop" : std::move(waiting),
           .server_epoch = server_epoch_,
           .emergency_stop = is_stopped,
           .open_commands = openCommands(RunPhase::kWaitingForPeople, is_stopped)};

@@ -42,7 +42,7 @@ class EventGenerator {
   /// The changes since the output of the last call; for the first call, the whole state.
   [[nodiscard]] TickEvents generate(const TickOutput& output);
   /// Of a session that waits for its first tick, which no output describes.
-  [[nodiscard]] RunState runBefore(bool is_stopped) const;
+  [[nodiscard]] RunState runBefore(bool is_stopped, const std::vector<std::string>& missing) const;
   /// A log entry of something outside the simulation (a join, a refused input), stamped with the last tick
   /// and the next number of the log.
   [[nodiscard]] EventLog makeEvent(Severity severity, std::string kind, std::string text);
@@ -67,8 +67,8 @@ class EventGenerator {
 };
 
 /// Packs objects into WorldFrames: first those whose pose or velocity is another than when they were packed
-/// last, so that one that stops is told to stand; then one of the others, round robin, so that every receiver
-/// is up to date after as many frames as there are objects, whatever was lost.
+/// last, so that zero velocity is sent once when an object stops; then one of the others, round robin, so
+/// that every receiver is up to date after as many frames as there are objects, whatever was lost.
 class FramePacker {
  public:
   explicit FramePacker(std::uint32_t server_epoch) : server_epoch_(server_epoch) {}

@@ -31,11 +31,12 @@ class InputBuffer {
   /// A reading newer than all before it; `reading.hand` must be below the number of hands.
   void put(const HandReading& reading) noexcept {
     Hand& hand = hands_[reading.hand.value];
+    const Numbered numbered{reading, hand.station.load(std::memory_order_relaxed)};
     const bool waits = hand.playout.load(std::memory_order_relaxed) > 0 ||
                        hand.period.load(std::memory_order_relaxed) > 1 ||
                        hand.catches_up.load(std::memory_order_relaxed);
-    if (waits) hand.queue.push(reading);
-    if (hand.newest.write(reading) && !waits) hand.replaced.fetch_add(1, std::memory_order_relaxed);
+    if (waits) hand.queue.push(numbered);
+    if (hand.newest.write(numbered) && !waits) hand.replaced.fetch_add(1, std::memory_order_relaxed);
   }
   /// From now on readings of `hand` wait for `ticks` [ticks], at most kMostPlayout.
   void setPlayout(HandId hand, std::uint32_t ticks) noexcept {
@@ -63,13 +64,13 @@ class InputBuffer {
   void setFreeze(HandId hand, std::uint32_t ticks) noexcept {
     hands_[hand.value].freeze.store(ticks, std::memory_order_relaxed);
   }
-  /// What has waited of `hand` is dropped: from now on another station moves it, at first with no playout, a
-  /// sample each tick and the freeze limit kFreezeTicks.
+  /// What has come of `hand` so far is dropped: from now on another station moves it, at first with no
+  /// playout, a sample each tick and the freeze limit kFreezeTicks.
   void restart(HandId hand) noexcept {
     setPlayout(hand, 0);
     setPeriod(hand, 1);
     setFreeze(hand, kFreezeTicks);
-    hands_[hand.value].restarts.store(true, std::memory_order_relaxed);
+    hands_[hand.value].station.fetch_add(1, std::memory_order_release);
   }
   /// False, and the change is dropped, when the queue is full because the tick has fallen behind.
   bool put(const Change& change) noexcept { return changes_.push(change); }
@@ -104,14 +105,19 @@ class InputBuffer {
   }
 
  private:
+  struct Numbered {
+    HandReading reading;
+    std::uint32_t station = 0;  ///< Hand::station when it came
+  };
   struct Hand {
-    threads::Latest<HandReading> newest;
-    threads::SpscQueue<HandReading> queue{64};  ///< used with a playout or a period
+    threads::Latest<Numbered> newest;
+    threads::SpscQueue<Numbered> queue{64};  ///< used with a playout or a period
     std::atomic<std::uint32_t> playout = 0, period = 1, freeze = kFreezeTicks, replaced = 0, missed = 0;
     std::atomic<std::uint32_t> most_behind = 0;  ///< [ticks] ReadingPlayout::mostBehind()
     std::atomic<bool> catches_up = false;        ///< the period is 1 again, and the ticks are still behind
-    std::atomic<bool> restarts = false;
+    std::atomic<std::uint32_t> station = 0;      ///< number of the one that moves it now
     // of the tick
+    std::uint32_t known_station = 0;
     ReadingPlayout readings;
     std::uint32_t silent = 0;   ///< [ticks] without a reading, up to the last one
     std::uint32_t counted = 0;  ///< of readings.replaced()
@@ -121,23 +127,26 @@ class InputBuffer {
   static const HandReading* take(Hand& hand) noexcept {
     const std::uint32_t playout = hand.playout.load(std::memory_order_relaxed);
     const std::uint32_t period = hand.period.load(std::memory_order_relaxed);
-    const bool is_new = hand.newest.update();
-    if (hand.restarts.exchange(false, std::memory_order_relaxed)) {
+    const bool has_come = hand.newest.update();
+    // after update(), which may have got a reading of this station
+    const std::uint32_t station = hand.station.load(std::memory_order_acquire);
+    const bool is_new = has_come && hand.newest.value().station == station;
+    if (station != hand.known_station) {
+      hand.known_station = station;
       hand.readings.clear();
       hand.catches_up.store(false, std::memory_order_relaxed);
-      while (hand.queue.front() != nullptr) hand.queue.pop();
     }
     if (period > 1) hand.catches_up.store(true, std::memory_order_relaxed);
     const bool is_between = hand.catches_up.load(std::memory_order_relaxed);
     if (playout == 0 && !is_between) {
       while (hand.queue.front() != nullptr) hand.queue.pop();
-      return is_new ? hand.readings.take(hand.newest.value()) : nullptr;
+      return is_new ? hand.readings.take(hand.newest.value().reading) : nullptr;
     }
-    for (const HandReading* reading = hand.queue.front(); reading != nullptr; reading = hand.queue.front()) {
-      hand.readings.add(*reading);
+    for (const Numbered* next = hand.queue.front(); next != nullptr; next = hand.queue.front()) {
+      if (next->station == station) hand.readings.add(next->reading);
       hand.queue.pop();
     }
-    if (is_new) hand.readings.add(hand.newest.value());  // the queue may have been full
+    if (is_new) hand.readings.add(hand.newest.value().reading);  // the queue may have been full
     const bool was_frozen = hand.silent > hand.freeze.load(std::memory_order_relaxed);
     const HandReading* const taken =
         is_between ? hand.readings.takeBetween(period, was_frozen) : hand.readings.takeBehind(playout);

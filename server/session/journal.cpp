@@ -4,7 +4,10 @@
 #include <cstdlib>
 #include <deque>
 #include <map>
+#include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -27,6 +30,7 @@ constexpr std::string_view kProtocol = "protocol";
 constexpr std::string_view kFreeze = "freeze after ticks";
 constexpr std::string_view kPark = "park after ticks";
 constexpr std::string_view kEpoch = "server epoch";
+constexpr std::string_view kOutcome = "tenon outcome";  // as in recordings
 
 /// A re-simulation in progress: restores checkpoints, applies inputs and compares hashes, message by message.
 class Resimulator {
@@ -40,6 +44,11 @@ class Resimulator {
     if (message.topic == wire::kCheckpoint.name) return readCheckpoint(message);
     return {};
   }
+  /// After the last message; `end`: the last tick of the run, none: not known.
+  void finish(std::optional<Tick> end) {
+    if (report_.reached != 0 && end && *end > report_.reached)
+      report_.gaps.push_back({.first = report_.reached + 1, .last = *end, .is_at_end = true});
+  }
   [[nodiscard]] const ResimulationReport& report() const { return report_; }
 
  private:
@@ -49,8 +58,7 @@ class Resimulator {
     if (!inputs_.add(*part)) return {};
     auto input = readTickInput(inputs_.bytes());
     if (!input) return fail(input.error().what);
-    apply({.input = std::move(*input), .hash = part->state_hash, .checkpoint = {}});
-    return {};
+    return take({.input = std::move(*input), .hash = part->state_hash, .checkpoint = {}});
   }
 
   Result<void> readPacked(const record::McapMessage& message) {
@@ -59,16 +67,41 @@ class Resimulator {
     for (const record::RecordedInput& one : *packed) {
       auto input = readTickInput(one.bytes);
       if (!input) return fail(input.error().what);
-      apply({.input = std::move(*input), .hash = one.state_hash, .checkpoint = {}});
+      if (auto taken = take({.input = std::move(*input), .hash = one.state_hash, .checkpoint = {}}); !taken)
+        return taken;
     }
     return {};
+  }
+
+  Result<void> take(JournalEntry entry) {
+    noteMissingBefore(entry.input.tick);
+    apply(std::move(entry));
+    if (synchronized_ || !ahead_ || ahead_->tick <= simulation_.now()) return {};
+    const Checkpoint next = *std::exchange(ahead_, std::nullopt);
+    return restore(next.bytes);
+  }
+
+  /// By the ticks that the file has, whether they can be compared or not.
+  void noteMissingBefore(Tick tick) {
+    std::vector<JournalGap>& gaps = report_.gaps;
+    // a resumed server has begun again: what its former life lacks from there on is not missing
+    while (tick <= report_.reached && !gaps.empty() && gaps.back().first >= tick) gaps.pop_back();
+    if (report_.reached != 0 && tick > report_.reached + 1)
+      gaps.push_back({.first = report_.reached + 1, .last = tick - 1});
+    report_.reached = tick;
+  }
+
+  [[nodiscard]] bool isMissing(Tick tick) const {
+    return std::any_of(report_.gaps.begin(), report_.gaps.end(),
+                       [&](const JournalGap& gap) { return gap.first <= tick && tick <= gap.last; });
   }
 
   void apply(JournalEntry entry) {
     const Tick expected = simulation_.now() + 1;
     if (synchronized_ && entry.input.tick < expected) return;
     if (synchronized_ && entry.input.tick > expected) {
-      report_.gaps.push_back({expected, entry.input.tick - 1, 0});
+      // inputs that waited too long for the checkpoint before them were given up
+      if (!isMissing(expected)) report_.gaps.push_back({.first = expected, .last = entry.input.tick - 1});
       synchronized_ = false;
     }
     if (!synchronized_) {
@@ -84,15 +117,28 @@ class Resimulator {
   Result<void> readCheckpoint(const record::McapMessage& message) {
     const auto part = wire::decode<CheckpointPart>(message.data);
     if (!part) return fail(part.error().what);
-    if (!checkpoints_.add(*part) || synchronized_) return {};
-    if (auto restored = simulation_.restore(checkpoints_.bytes()); !restored) return restored;
-    if (const Tick first = std::exchange(first_, 0); first != 0 && simulation_.now() > first)
-      report_.gaps.push_back({first, simulation_.now(), simulation_.now()});
-    if (!report_.gaps.empty() && report_.gaps.back().compared_after == 0)
-      report_.gaps.back().compared_after = simulation_.now();
+    if (!checkpoints_.add(*part)) return {};
+    if (!synchronized_) return restore(checkpoints_.bytes());
+    // the inputs before it are missing, or on their way
+    if (part->tick > simulation_.now())
+      ahead_ = Checkpoint{part->tick, {checkpoints_.bytes().begin(), checkpoints_.bytes().end()}};
+    return {};
+  }
+
+  /// Continues after a checkpoint.
+  Result<void> restore(std::span<const std::uint8_t> checkpoint) {
+    if (auto restored = simulation_.restore(checkpoint); !restored) return restored;
+    const Tick now = simulation_.now();
+    std::vector<JournalGap>& gaps = report_.gaps;
+    if (const Tick first = std::exchange(first_, 0); first != 0 && now > first) {
+      std::erase_if(gaps, [&](const JournalGap& gap) { return gap.last <= now; });
+      gaps.insert(gaps.begin(), {.first = first, .last = now, .compared_after = now});
+    }
+    for (JournalGap& gap : gaps)
+      if (gap.compared_after == 0 && gap.last <= now) gap.compared_after = now;
     synchronized_ = true;
     for (JournalEntry& entry : std::exchange(waiting_, {}))
-      if (entry.input.tick > simulation_.now()) apply(std::move(entry));
+      if (entry.input.tick > now) apply(std::move(entry));
     return {};
   }
 
@@ -112,13 +158,41 @@ class Resimulator {
   /// The last inputs while it is not: DDS keeps the order within a topic, so that in a recording a checkpoint
   /// may follow inputs of later ticks.
   std::deque<JournalEntry> waiting_;
+  struct Checkpoint {
+    Tick tick = 0;
+    std::vector<std::uint8_t> bytes;
+  };
+  /// The newest one of a later tick than the simulation's, for when it lacks the inputs up to there.
+  std::optional<Checkpoint> ahead_;
 };
+
+/// By the outcome; none where the file has none, as of a server that was killed, or was closed before the
+/// end.
+std::optional<Tick> lastTickOfRun(const record::McapReader& reader) {
+  std::optional<Tick> last;
+  const auto [begin, end] = reader.metadata().equal_range(std::string(kOutcome));
+  for (auto outcome = begin; outcome != end; ++outcome) {
+    const auto& values = outcome->second;
+    const auto tick = values.find("tick");
+    const auto hash = values.find("final hash");
+    if (tick == values.end() || hash == values.end()) continue;
+    if (std::strtoull(hash->second.c_str(), nullptr, 16) == 0) continue;  // RunState: the run is not over
+    last = std::max<Tick>(last.value_or(0), std::strtoull(tick->second.c_str(), nullptr, 10));
+  }
+  return last;
+}
 
 std::string nameTheScenario(const std::filesystem::path& file) {
   return fmt::format("name it as well, as in: tenon resimulate {} scenarios/engine_bay", file.string());
 }
 
 }  // namespace
+
+Tick ResimulationReport::gapTicks() const {
+  Tick ticks = 0;
+  for (const JournalGap& gap : gaps) ticks += gap.last - gap.first + 1;
+  return ticks;
+}
 
 Journal::Journal(record::McapWriter writer) : writer_(std::move(writer)) {
   input_channel_ =
@@ -179,10 +253,9 @@ Result<void> Journal::write(const JournalEntry& entry) {
 }
 
 Result<void> Journal::close(const RunState& run) {
-  const auto added =
-      writer_.addMetadata("tenon outcome", {{"reason", run.reason},
-                                            {"tick", std::to_string(run.tick)},
-                                            {"final hash", fmt::format("{:016x}", run.final_hash)}});
+  const auto added = writer_.addMetadata(kOutcome, {{"reason", run.reason},
+                                                    {"tick", std::to_string(run.tick)},
+                                                    {"final hash", fmt::format("{:016x}", run.final_hash)}});
   if (!added) return added;
   return writer_.close();
 }
@@ -199,7 +272,11 @@ Result<ResimulationReport> resimulate(const std::filesystem::path& file, Session
   while (reader->next(message))
     if (auto read = resimulator.read(message); !read)
       return fail(fmt::format("{}: {}", file.string(), read.error().what));
+  const std::optional<Tick> end = lastTickOfRun(*reader);
+  resimulator.finish(end);
   ResimulationReport report = resimulator.report();
+  report.is_journal = is_journal;
+  report.has_no_end = !end && (is_journal || !reader->complete());
   report.problem = reader->problem();
   report.is_damaged = reader->isDamaged();
   if (report.compared > 0) return report;

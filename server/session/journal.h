@@ -88,17 +88,30 @@ class Journal {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Ticks that a journal or recording does not have, or not with the checkpoint before them.
+/// Ticks that a journal or recording does not have, or, at its begin, not with the checkpoint before them.
 struct JournalGap {
   Tick first = 0, last = 0;
-  Tick compared_after = 0;  ///< of the checkpoint from which on ticks are compared again; 0: there is none
+  /// Of the next checkpoint, from which on ticks are compared again; 0: none follows. Gaps that follow each
+  /// other without a checkpoint between them have the same one, and what lies between them is not compared.
+  Tick compared_after = 0;
+  bool is_at_end = false;  ///< `last` is the last tick of the run, by its outcome
 };
 
 /// Result of a re-simulation.
 struct ResimulationReport {
   Tick first = 0, last = 0;  ///< ticks compared
   std::uint64_t compared = 0;
-  std::vector<JournalGap> gaps;  ///< in their order; of a journal also before its first checkpoint
+  /// All of them, in their order, also where nothing could be compared anyway; of a journal also before its
+  /// first checkpoint. The end of a run that is missing is one.
+  std::vector<JournalGap> gaps;
+  /// In all gaps.
+  [[nodiscard]] Tick gapTicks() const;
+  bool is_journal = false;  ///< of a server, which --resume continues; else a recording
+  Tick reached = 0;         ///< of the newest inputs in the file, also where they are not compared
+  /// The file does not record how the run ended, so there may have been ticks after `reached`: its program
+  /// was killed, still runs, or could not write it any more. Not of a recording that was closed before that
+  /// end.
+  bool has_no_end = false;
   std::uint64_t final_hash = 0;
   std::optional<Tick> first_difference;  ///< first tick whose hash differs
   std::string problem;                   ///< damage and truncation found in the file, or empty
@@ -109,6 +122,8 @@ struct ResimulationReport {
 /// hash of each. It uses the recorded inputs alone and no clock: budgets chosen by measured time are among
 /// the inputs. A difference is reported and the remaining ticks are compared all the same. Fails when `file`
 /// cannot be read, is of another scenario, or has no tick after a checkpoint.
+/// How far a run went is known by its outcome alone, which is written last: what a server that was killed, or
+/// whose disk hung, did after its last write is recorded nowhere.
 [[nodiscard]] Result<ResimulationReport> resimulate(const std::filesystem::path& file,
                                                     SessionSimulation& simulation);
 

@@ -3,9 +3,14 @@
 #include <chrono>
 #include <utility>
 
+#include "idl/threads/scheduling.h"
+
 namespace tenon::session {
 namespace {
 
+// Below those of ticks and wire. Without one the file lacks ticks, which go on at high load. Its thread
+// sleeps nearly always. Copies have the default scheduling: a recorder may wait.
+constexpr int kFilePriority = 40;
 // what a server that is killed loses at most
 constexpr auto kPass = std::chrono::milliseconds(20);
 constexpr auto kLastCopies = std::chrono::seconds(5);  // after the last tick, for a slow recorder
@@ -91,33 +96,58 @@ void JournalWriter::writeNow() {
 }
 
 void JournalWriter::start() {
-  file_thread_ = std::thread([this] {
-    while (true) {
-      const bool last_pass = ending_;  // no further entries will come
-      if (writePending(false)) continue;
-      if (last_pass) break;
-      std::this_thread::sleep_for(kPass);
+  file_thread_ = std::thread([this] { writeFile(); });
+  if (publish_) copy_thread_ = std::thread([this] { giveCopies(); });
+}
+
+void JournalWriter::writeFile() {
+  threads::nameThisThread("journal");
+  // where it is not granted, the ticks' is neither, which people are told
+  static_cast<void>(threads::raiseThisThread(kFilePriority));
+  while (true) {
+    const bool last_pass = ending_;  // no further entries will come
+    if (writePending(false)) continue;
+    if (last_pass) break;
+    std::this_thread::sleep_for(kPass);
+  }
+  written_ = true;
+  if (outcome_ && journal_ && !problem()) keepProblem(journal_->close(*outcome_));
+  ended_ = true;
+}
+
+void JournalWriter::giveCopies() {
+  std::optional<std::chrono::steady_clock::time_point> until;
+  while (true) {
+    const bool last_pass = written_;
+    for (JournalEntry* entry = copies_.front(); entry != nullptr; entry = copies_.front()) {
+      publish_(*entry);
+      // else each slot would keep the memory of a checkpoint
+      std::vector<std::uint8_t>().swap(entry->checkpoint);
+      copies_.pop();
+      if (!written_) continue;
+      if (!until) until = std::chrono::steady_clock::now() + kLastCopies;
+      if (std::chrono::steady_clock::now() > *until) return;
     }
-    written_ = true;
-  });
-  if (!publish_) return;
-  copy_thread_ = std::thread([this] {
-    std::optional<std::chrono::steady_clock::time_point> until;
-    while (true) {
-      const bool last_pass = written_;
-      for (JournalEntry* entry = copies_.front(); entry != nullptr; entry = copies_.front()) {
-        publish_(*entry);
-        // else each slot would keep the memory of a checkpoint
-        std::vector<std::uint8_t>().swap(entry->checkpoint);
-        copies_.pop();
-        if (!written_) continue;
-        if (!until) until = std::chrono::steady_clock::now() + kLastCopies;
-        if (std::chrono::steady_clock::now() > *until) return;
-      }
-      if (last_pass) return;
-      std::this_thread::sleep_for(kPass);
-    }
-  });
+    if (last_pass) return;
+    std::this_thread::sleep_for(kPass);
+  }
+}
+
+void JournalWriter::end(const RunState& run) {
+  outcome_ = run;
+  ending_ = true;
+  if (!file_thread_.joinable()) file_thread_ = std::thread([this] { writeFile(); });
+}
+
+bool JournalWriter::isEndedWithin(std::chrono::steady_clock::duration patience) {
+  const auto until = std::chrono::steady_clock::now() + patience;
+  while (!ended_ && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(kPass);
+  return ended_;
+}
+
+void JournalWriter::leaveFile() {
+  written_ = true;
+  if (copy_thread_.joinable()) copy_thread_.join();
 }
 
 void JournalWriter::stop() {
@@ -125,12 +155,6 @@ void JournalWriter::stop() {
   if (file_thread_.joinable()) file_thread_.join();
   written_ = true;
   if (copy_thread_.joinable()) copy_thread_.join();
-}
-
-Result<void> JournalWriter::close(const RunState& run) {
-  if (!journal_) return {};
-  if (const auto why = problem()) return fail(*why);
-  return journal_->close(run);
 }
 
 }  // namespace tenon::session

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <mutex>
@@ -21,8 +22,8 @@ namespace tenon::session {
 /// seconds behind, so that the file has a gap; a copy, when a recorder is, so that its recording has one.
 /// When the file cannot be written any more it ends there, and copies continue.
 ///
-/// Threads: add from one (tick); start, stop and close from another; writes and copies have threads of their
-/// own between start and stop. The numbers from any. Real-time: add.
+/// Threads: add from one (tick); start, end and stop from another; writes, with the end of the file, and
+/// copies have threads of their own up to stop. The numbers from any. Real-time: add.
 class JournalWriter {
  public:
   using Publish = std::function<void(const JournalEntry&)>;
@@ -38,21 +39,31 @@ class JournalWriter {
   /// The state after `input` is that of `simulation`, with this hash.
   void add(const TickInput& input, std::uint64_t hash, const SessionSimulation& simulation) noexcept;
   void start();
-  /// Returns when all entries are written and their copies given away, or the reader is hopelessly behind.
+  /// Takes no further entries. After the rest the outcome of the run is written, and the file closed.
+  void end(const RunState& run);
+  /// Whether the file is closed within `patience`, or ended before (problem).
+  [[nodiscard]] bool isEndedWithin(std::chrono::steady_clock::duration patience);
+  /// Returns when all entries are written and their copies given away, or the reader is hopelessly behind;
+  /// without end() the file stays as that of a killed server.
   void stop();
+  /// In place of stop, when the disk hangs: ends the copies. Then only the end of the process ends what waits
+  /// for the disk; the destructor waits for it.
+  void leaveFile();
   /// Without start (lockstep): writes what was added and gives the copies away, here.
   void writeNow();
-  /// Writes the outcome of the run. Fails when the file has ended before.
-  [[nodiscard]] Result<void> close(const RunState& run);
 
-  /// Why the file has ended before the session; none while it is written.
+  /// Why the file has ended before the session, or is not whole; none while it is written.
   [[nodiscard]] std::optional<std::string> problem() const;
   [[nodiscard]] std::uint64_t lostEntries() const { return entries_.dropped(); }
+  /// Not yet written.
+  [[nodiscard]] std::uint64_t waitingEntries() const { return entries_.size(); }
   [[nodiscard]] std::uint64_t lostCopies() const { return copies_.dropped(); }
 
  private:
   bool acquireBuffer(JournalEntry& entry) noexcept;
   bool writePending(bool inline_copies);
+  void writeFile();
+  void giveCopies();
   void keepProblem(const Result<void>& done);
 
   std::optional<Journal> journal_;
@@ -67,8 +78,9 @@ class JournalWriter {
   /// empty checkpoint buffers, back to the tick
   threads::SpscQueue<std::vector<std::uint8_t>> buffers_{2};
   std::vector<JournalEntry> batch_{kBatch};
-  bool has_checkpoint_ = false;  ///< one was added
-  std::atomic<bool> ending_ = false, written_ = false;
+  bool has_checkpoint_ = false;      ///< one was added
+  std::optional<RunState> outcome_;  ///< before ending_
+  std::atomic<bool> ending_ = false, written_ = false, ended_ = false;
   std::thread file_thread_, copy_thread_;
   mutable std::mutex mutex_;  ///< of problem_
   std::optional<std::string> problem_;

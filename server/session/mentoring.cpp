@@ -12,7 +12,7 @@
 namespace tenon::session {
 namespace {
 
-constexpr Tick kSaidOff = 200;  // [ticks]
+constexpr Tick kOffRepeatTicks = 200;  // [ticks] for which the end of a guidance is repeated
 
 std::vector<std::string_view> split(std::string_view words) {
   std::vector<std::string_view> all;
@@ -237,8 +237,8 @@ tl::expected<void, Refused> Mentoring::end(std::string_view words, Role role) {
 }
 
 void Mentoring::erase(std::size_t index) {
-  unsaid_.push_back(choices_[index].hand);
-  if (choices_[index].mutual) unsaid_.push_back(choices_[index].guide);
+  ended_since_tick_.push_back(choices_[index].hand);
+  if (choices_[index].mutual) ended_since_tick_.push_back(choices_[index].guide);
   choices_.erase(choices_.begin() + static_cast<std::ptrdiff_t>(index));
 }
 
@@ -263,7 +263,8 @@ std::vector<Guidance> Mentoring::step(const TickOutput& output, std::span<const 
     erase(i);
   }
   std::vector<Guidance> fixtures;
-  for (const HandId hand : std::exchange(unsaid_, {})) ended_.push_back({hand, output.tick + kSaidOff});
+  for (const HandId hand : std::exchange(ended_since_tick_, {}))
+    ended_.push_back({hand, output.tick + kOffRepeatTicks});
   std::erase_if(ended_, [&](const Ended& one) { return output.tick > one.until; });
   if (output.tick % kPeriod != 0) return fixtures;
   if (!choices_.empty() && step_.revision != output.step.revision)

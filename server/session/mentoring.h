@@ -118,7 +118,7 @@ class Mentoring {
   std::vector<Choice> choices_;
   std::map<ClientId, double> round_trips_;  ///< [s]
   std::vector<Path> paths_;                 ///< the last one of each guide
-  std::vector<HandId> unsaid_;              ///< ended since the last tick
+  std::vector<HandId> ended_since_tick_;
   std::vector<Ended> ended_;
   StepState step_;  ///< current
 };

@@ -30,16 +30,18 @@ class ReadingPlayout {
   const HandReading* takeBehind(std::uint32_t playout) noexcept;
 
   /// Of a hand that sends a sample each `period` [ticks]: the reading of one tick after that of the last
-  /// call, on the straight line between two samples. A sample that is late holds the hand at the newest one,
-  /// and from then on it is so much farther behind. More than three periods behind it goes an eighth faster,
-  /// more than kMostPeriodsBehind twice as fast; after a silence for which it `was_frozen`, or as long as the
-  /// longest one for which it is not, at once to one period behind. So a link's jitter becomes a delay. With
-  /// a period of 1 the delay is worked off. Null: none.
+  /// call, on the straight line between two samples; null: none. A sample that is late holds the hand at the
+  /// newest one, and the backlog, by which the hand is behind, grows by as much: so a link's jitter becomes a
+  /// delay. The backlog decides how much of it is played each tick:
+  /// - up to 3 periods: 1 tick (with a period of 1: up to 1);
+  /// - more than 3: 9/8 ticks;
+  /// - more than 8: 2 ticks;
+  /// - after a freeze (`was_frozen`), or beyond the larger of 8 periods and the longest freeze: jump to one
+  ///   period.
   const HandReading* takeBetween(std::uint32_t period, bool was_frozen = false) noexcept;
   /// [ticks] from the reading that was taken last to the newest that has come.
   [[nodiscard]] std::uint32_t behind() const noexcept;
-  /// [ticks] largest of behind(), after takeBetween(), in the last one to two kWindow: so far was the reading
-  /// of a tick behind the sample that took least time on its way.
+  /// Largest backlog [ticks] within the last 1 to 2 s: of behind() after takeBetween().
   [[nodiscard]] std::uint32_t mostBehind() const noexcept {
     return std::max(most_behind_[0], most_behind_[1]);
   }

@@ -165,7 +165,7 @@ void Reception::finishKicks() {
 void Reception::dismissStuckRecorders() {
   if (copies_ == nullptr) return;
   for (const ClientId client : copies_->takeStuck())
-    dismiss(client, "takes no inputs of the ticks, and is removed until it joins again");
+    dismiss(client, "does not receive the journal copies; removed until it joins again");
 }
 
 }  // namespace tenon::session

@@ -17,13 +17,7 @@
 namespace tenon::session {
 namespace {
 
-constexpr auto kBetweenLimits = std::chrono::milliseconds(500);  // changes of a station's limits
-constexpr std::size_t kMostScenarioName = 63;    // [bytes] of SessionAnnounce in idl/tenon.idl
-constexpr std::uint32_t kLoggedFreezeStep = 30;  // [ticks] smaller changes of a freeze limit are not logged
-
-std::int64_t nowNanoseconds() {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-}
+constexpr std::size_t kMostScenarioName = 63;  // [bytes] of SessionAnnounce in idl/tenon.idl
 
 SessionAnnounce announcementOf(const WireOptions& options, const LoadedScene& loaded) {
   const game_control::ScenarioFile& scenario = *loaded.scenario;
@@ -57,7 +51,7 @@ ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<wire::Partici
       registry_(registry),
       input_buffer_(input_buffer),
       publisher_(publisher),
-      stops_(options.stop_file, *writers_) {
+      stops_(options.stop_file, *writers_, options.server_epoch) {
   stops_.not_kept = [this](const std::string& why) {
     log(Severity::kError, "emergency stop",
         fmt::format("{} a crash of the server: {}",
@@ -133,8 +127,9 @@ Result<void> ServerWire::openReaders() {
   listenTo(session_, wire::kTelemetry, [this](const Telemetry& telemetry, const wire::Origin& from) {
     const Presence* const sender = registry_.findClient(telemetry.client);
     if (sender == nullptr)
-      return refuse(fmt::format("telemetry of client {}, which nobody is", telemetry.client.value));
-    if (isGenuine(telemetry.client, from, "telemetry") && sender->alive) handle(telemetry);
+      return refuse(fmt::format("telemetry of unknown client {}", telemetry.client.value));
+    // nobody is on the seat: of a station that is on its way back from an earlier life of the server
+    if (sender->alive && isGenuine(telemetry.client, from, "telemetry")) handle(telemetry);
   });
   listenTo(lobby_, wire::kSessionAnnounce,
            [this](const SessionAnnounce& other, const wire::Origin& from) { handle(other, from); });
@@ -184,6 +179,9 @@ void ServerWire::sendScene(const LoadedScene& loaded) {
     const game_control::ScenarioState& state = scenario.states[i];
     writers_->scene_step.send({i, steps, state.name, state.title, state.part});
   }
+  writers_->scene_title.send({scenario.title});
+  for (std::uint32_t i = 0; i < scenario.signals.size(); ++i)
+    writers_->scene_signal.send({i, scenario.signals[i]});
 }
 
 void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
@@ -212,6 +210,8 @@ void ServerWire::update(const TickOutput& output) {
   now_ = output.tick;
   reception_->setTick(now_);
   registry_.updatePhase(output.phase);
+  const bool is_in_step = output.step.phase == StepPhase::kActive;
+  registry_.updateStep(is_in_step ? std::optional(output.step.step) : std::nullopt);
   registry_.updateCommands(output.commands);
   for (const std::string& text : registry_.takeDroppedCommands()) log(Severity::kWarning, "dropped", text);
   sendGuidance(output);
@@ -253,55 +253,6 @@ bool ServerWire::isGenuine(ClientId client, const wire::Origin& from, const std:
   return false;
 }
 
-/// Of a client that has got a seat.
-void ServerWire::beginInputs(const Welcome& welcome) {
-  for (const HandId hand : welcome.hands) {
-    if (!hand.valid()) continue;
-    newest_seq_[hand.value] = 0;
-    input_buffer_.restart(hand);
-    passFreezeLimit(hand);
-  }
-  received_inputs_.erase(welcome.client);
-  contributions_.end(welcome.client);  // of a former presence
-}
-
-void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
-  // of a station that is on its way back from an earlier life of the server
-  if (input.server_epoch != options_.server_epoch && !registry_.ownsSeat(input.client, from)) return;
-  if (!isGenuine(input.client, from, "device input")) return;
-  const Presence* sender = registry_.findClient(input.client);
-  if (sender != nullptr && !sender->alive && input.server_epoch == options_.server_epoch)
-    return reception_->notifySeatLost(input.client, "its process or link was lost");
-  const auto reading = registry_.validateDeviceInput(input);
-  if (!reading) return refuse(reading.error().what);
-  ReceivedInputs& received = received_inputs_[input.client];
-  ++received.count;
-  received.gaps.received(nowNanoseconds());
-  received.newest_seq = std::max(received.newest_seq, reading->seq);
-  std::uint32_t& newest = newest_seq_[input.hand.value];
-  if (options_.lockstep && reading->seq == newest && newest == now_) resend_requested_ = true;
-  if (reading->seq <= newest && newest - reading->seq < 0x80000000U) return;  // out of order, or a repetition
-  if (options_.lockstep && reading->seq > now_ + 1)
-    return reception_->dismiss(
-        input.client, fmt::format("sent the input of tick {} when tick {} was the next, and is removed: in "
-                                  "lockstep an input answers a received tick",
-                                  reading->seq, now_ + 1));
-  if (!options_.lockstep) input_buffer_.setPeriod(input.hand, input.period);
-  if (input_buffer_.playout(input.hand) > 0) handleEarlier(input, newest);
-  newest = reading->seq;
-  input_buffer_.put(*reading);
-}
-
-/// Those after `newest`, whose own messages are lost or late.
-void ServerWire::handleEarlier(const DeviceInput& input, std::uint32_t newest) {
-  DeviceInput one = input;
-  for (std::size_t i = input.earlier.size(); i-- > 0;) {
-    one.sample = input.earlier[i];
-    if (one.sample.seq <= newest || one.sample.seq >= input.sample.seq) continue;
-    if (const auto reading = registry_.validateDeviceInput(one)) input_buffer_.put(*reading);
-  }
-}
-
 void ServerWire::handle(const Command& command, const wire::Origin& from) {
   if (!isGenuine(command.client, from, "command")) return;
   if (const CommandAck* again = registry_.previousAck(command)) {
@@ -333,11 +284,7 @@ void ServerWire::handle(const EmergencyStop& stop, const wire::Origin& from) {
 }
 
 void ServerWire::raiseStop(const std::string& reason) {
-  if (registry_.isStopEngaged()) return;
-  EmergencyStop stop{
-      .client_guid = "server", .counter = options_.server_epoch, .who = "server", .reason = reason};
-  while (stops_.wasCleared(stop)) ++stop.counter;
-  engage(stop);
+  if (!registry_.isStopEngaged()) engage(stops_.ownRaise(reason));
 }
 
 void ServerWire::engage(const EmergencyStop& stop) {
@@ -345,20 +292,21 @@ void ServerWire::engage(const EmergencyStop& stop) {
   if (!change) return;
   registry_.engageEmergencyStop();
   forwardChanges();
-  stops_.publish(stop);
+  stops_.publish(stop, change);
   const std::string text = fmt::format("engaged by {}: {}", stop.who, stop.reason);
   // of somebody who raises it without end, at a bounded rate
-  if (!change.superfluous || refusals_.add(text, std::chrono::steady_clock::now()))
+  const bool is_first = !change.superfluous && !change.ended;
+  if (is_first || refusals_.add(text, std::chrono::steady_clock::now()))
     log(Severity::kError, "emergency stop", text);
 }
 
 void ServerWire::logStandingStops() {
   if (!stops_.engaged()) return;
-  const EmergencyStop& one = stops_.standing().begin()->second;
-  const std::size_t others = stops_.standing().size() - 1;
+  const NewestRaise& one = stops_.newest();
+  const std::uint32_t others = one.standing > 2 ? one.standing - 2 : 0;  // but that of this server
   log(Severity::kError, "emergency stop",
-      fmt::format("the emergency stop stands since before this start: engaged by {}: {}{}", one.who,
-                  one.reason, others == 0 ? "" : fmt::format(", and {} more", others)));
+      fmt::format("an emergency stop raised before this server's start still stands: engaged by {}: {}{}",
+                  one.who, one.reason, others == 0 ? "" : fmt::format(", and {} more", others)));
 }
 
 void ServerWire::clearEmergencyStop(const Command& command, const std::string& who) {
@@ -371,66 +319,6 @@ void ServerWire::clearEmergencyStop(const Command& command, const std::string& w
       fmt::format("cleared by {}: {}{}{}", who, reason, reason.empty() ? "" : "; ", next));
 }
 
-void ServerWire::handle(const ClockSync& sync) {
-  if (sync.server_sent_ns != 0) return;  // the server's own answer
-  ClockSync answer = sync;
-  answer.server_received_ns = nowNanoseconds();
-  if (const auto inputs = received_inputs_.find(sync.client); inputs != received_inputs_.end()) {
-    answer.inputs_received = inputs->second.count;
-    answer.newest_seq = inputs->second.newest_seq;
-    answer.longest_gap = inputs->second.gaps.longest(nowNanoseconds());
-    for (const HandId hand : registry_.findClient(sync.client)->hands) {
-      answer.inputs_replaced += input_buffer_.replaced(hand);
-      answer.ticks_without_input += input_buffer_.missed(hand);
-    }
-  }
-  answer.server_sent_ns = nowNanoseconds();
-  writers_->clock.send(answer);
-}
-
-/// What a station asks for by what its link does. In lockstep the server waits for inputs: no limit applies.
-void ServerWire::handle(const Telemetry& telemetry) {
-  registry_.receive(telemetry);
-  const auto inputs = received_inputs_.find(telemetry.client);
-  if (options_.lockstep || inputs == received_inputs_.end()) return;
-  const Presence& station = *registry_.findClient(telemetry.client);
-  for (const HandId hand : station.hands)
-    if (registry_.controllerOf(hand) == telemetry.client)
-      input_buffer_.setPlayout(hand, telemetry.playout_ticks);
-  const auto now = std::chrono::steady_clock::now();
-  if (now - inputs->second.limits_set_at < kBetweenLimits) return;
-  const double round_trip = telemetry.clock_known ? telemetry.round_trip : 0.0;
-  const auto kept_back = [this](HandId hand) { return input_buffer_.keptBack(hand); };
-  if (!registry_.setLimits(telemetry.client, telemetry.limits, round_trip, kept_back)) return;
-  for (const HandId hand : station.hands)
-    if (registry_.controllerOf(hand) == telemetry.client) passFreezeLimit(hand);
-  inputs->second.limits_set_at = now;
-  const HandLimits& limits = registry_.limitsOf(station.hands.front());
-  std::uint32_t& logged = inputs->second.logged_freeze;
-  if (std::max(limits.freeze_ticks, logged) - std::min(limits.freeze_ticks, logged) < kLoggedFreezeStep)
-    return;
-  logged = limits.freeze_ticks;
-  log(Severity::kInfo, "link",
-      fmt::format(
-          "{}: a hand without input is held still after {} ms and parked after {} ms; inputs come up to "
-          "{:.0f} ms apart, {:.2f} % are lost",
-          station.name, limits.freeze_ticks, limits.park_ticks,
-          1e3 * inputs->second.gaps.longest(nowNanoseconds()), 1e2 * telemetry.inputs_lost));
-}
-
-void ServerWire::passFreezeLimit(HandId hand) {
-  input_buffer_.setFreeze(hand, std::max(static_cast<std::uint32_t>(options_.limits.freeze),
-                                         registry_.limitsOf(hand).freeze_ticks));
-}
-
-void ServerWire::publishLimits() {
-  for (SceneHand& hand : scene_hands_) {
-    if (hand.limits == registry_.limitsOf(hand.hand)) continue;
-    hand.limits = registry_.limitsOf(hand.hand);
-    writers_->hand.send(hand);
-  }
-}
-
 void ServerWire::handleGone(const Presence& presence, const wire::Origin& from) {
   if (from.known() && !isGenuine(presence.client, from, "departure notice")) return;
   reception_->handleGone(presence.client);
@@ -440,10 +328,17 @@ void ServerWire::send(const EventLog& event) { writers_->event.send(event); }
 
 void ServerWire::send(const RunState& run) { writers_->run.send(run); }
 
+const HandManifold& ServerWire::numbered(const HandManifold& manifold, std::vector<std::uint32_t>& sent) {
+  if (sent.size() <= manifold.hand.value) sent.resize(manifold.hand.value + 1);
+  numbered_ = manifold;
+  numbered_.sent = ++sent[manifold.hand.value];
+  return numbered_;
+}
+
 void ServerWire::resendLast() {
   if (last_ == nullptr) return;
   for (const WorldFrame& frame : last_->frames) writers_->frame_1k.write(frame);
-  for (const HandManifold* manifold : last_->manifolds) writers_->manifold.write(*manifold);
+  for (const HandManifold* manifold : last_->manifolds) writers_->manifold.write(numbered(*manifold, sent_));
 }
 
 void ServerWire::send(const OutgoingMessages& outgoing) {
@@ -458,9 +353,10 @@ void ServerWire::send(const OutgoingMessages& outgoing) {
   for (const GrabState& grab : outgoing.events.grabs) to.grab.write(grab);
   for (const ObjectSnapshot& snapshot : outgoing.events.snapshots) to.snapshot.write(snapshot);
   for (const WorldFrame& frame : outgoing.frames) to.frame_1k.write(frame);
-  for (const HandManifold* manifold : outgoing.manifolds) to.manifold.write(*manifold);
+  for (const HandManifold* manifold : outgoing.manifolds) to.manifold.write(numbered(*manifold, sent_));
   for (const WorldFrame& frame : outgoing.frames_100) to.frame_100.write(frame);
-  for (const HandManifold* manifold : outgoing.manifolds_50) to.manifold_50.send(*manifold);
+  for (const HandManifold* manifold : outgoing.manifolds_50)
+    to.manifold_50.send(numbered(*manifold, sent_50_));
   for (const WorldFrame& frame : outgoing.frames_30) to.frame_30.write(frame);
   for (const ContactPairs& pairs : outgoing.pairs) to.pairs.write(pairs);
   if (outgoing.stats) to.stats.write(*outgoing.stats);

@@ -121,6 +121,9 @@ class ServerWire {
   void handleEarlier(const DeviceInput& input, std::uint32_t newest);
   void handle(const ClockSync& sync);
   void handle(const Telemetry& telemetry);
+  void logDelay(const std::string& person, const Telemetry& telemetry);
+  /// `manifold` with the next number of its hand in `sent`; valid until the next call.
+  const HandManifold& numbered(const HandManifold& manifold, std::vector<std::uint32_t>& sent);
   void passFreezeLimit(HandId hand);
   void publishLimits();
   void handle(const SessionAnnounce& other, const wire::Origin& from);
@@ -157,6 +160,7 @@ class ServerWire {
     GapMeter gaps;
     std::chrono::steady_clock::time_point limits_set_at;
     std::uint32_t logged_freeze = HandLimits{}.freeze_ticks;  ///< [ticks] the newest in the log
+    bool guidance_alone = false;                              ///< Telemetry::guidance_alone, as logged
   };
   std::map<ClientId, ReceivedInputs> received_inputs_;  ///< ClockSync
   std::uint64_t refused_inputs_ = 0;
@@ -164,8 +168,10 @@ class ServerWire {
   Contributions contributions_;
   bool resend_requested_ = false;
   Tick now_ = 0;
-  const OutgoingMessages* last_ = nullptr;  ///< of the last send
-  PublishedSamples published_;              ///< since the last statement
+  const OutgoingMessages* last_ = nullptr;     ///< of the last send
+  std::vector<std::uint32_t> sent_, sent_50_;  ///< HandManifold::sent of each topic, by hand
+  HandManifold numbered_;
+  PublishedSamples published_;  ///< since the last statement
 };
 
 }  // namespace tenon::session

@@ -106,6 +106,8 @@ struct ServerWriters {
   TopicWriter<SceneObject> object{wire::kSceneObject, {}};
   TopicWriter<SceneHand> hand{wire::kSceneHand, {}};
   TopicWriter<SceneStep> scene_step{wire::kSceneStep, {}};
+  TopicWriter<SceneTitle> scene_title{wire::kSceneTitle, {}};
+  TopicWriter<SceneSignal> scene_signal{wire::kSceneSignal, {}};
   TopicWriter<StepState> step{wire::kStepState, {}};
   TopicWriter<StepProgress> progress{wire::kStepProgress, {}};
   TopicWriter<RunState> run{wire::kRunState, {}};
@@ -122,9 +124,9 @@ struct ServerWriters {
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
-    return std::tie(frame_1k, frame_100, frame_30, pairs, stats, snapshot, object, hand, scene_step, step,
-                    progress, run, grab, matrix, ack, guidance, event, clock, stop, clear, newest_raise,
-                    published);
+    return std::tie(frame_1k, frame_100, frame_30, pairs, stats, snapshot, object, hand, scene_step,
+                    scene_title, scene_signal, step, progress, run, grab, matrix, ack, guidance, event, clock,
+                    stop, clear, newest_raise, published);
   }
   auto ofHands() { return std::tie(manifold, manifold_50); }
   /// Written in ticks by send(OutgoingMessages), with the tick in each sample, and recorded.

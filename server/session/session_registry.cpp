@@ -92,7 +92,7 @@ std::string SessionRegistry::joinRefusal(const Join& join, const JoinProofs& pro
   if (join.client_guid.empty())
     return "the join request has no client_guid: the answer could not be addressed";
   if (const auto former = indexOf(join.seat_key); former && seats_[*former].is_closed)
-    return "you were removed from this session: who leads it lets you in again in another one";
+    return "you were removed from this session; ask the instructor to admit you to a new one";
   if (isSeated(join.client_guid)) return "another program has joined with this client_guid";
   if ((role->needs_key || key_of_all_) && !proofs.key)
     return join.key_proof.empty()
@@ -352,7 +352,8 @@ CommandAck SessionRegistry::decide(const Command& command, Role role, const Newe
                                       .controllers = controllers_,
                                       .is_stop_engaged = isStopEngaged(),
                                       .newest = newest,
-                                      .is_instructor_present = isRolePresent(Role::kInstructor)});
+                                      .is_instructor_present = isRolePresent(Role::kInstructor),
+                                      .step = accepted_.waiting() > 0 ? std::nullopt : step_});
   if (!change) return answer(tl::unexpected(change.error()));
   if (const auto possible = gate_.check(command.kind); !possible) return answer(possible);
   const bool is_vital = command.kind == CommandKind::kStop || command.kind == CommandKind::kPause ||

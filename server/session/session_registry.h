@@ -89,6 +89,8 @@ class SessionRegistry {
   [[nodiscard]] std::vector<ClientId> takeKicked();
   /// Phase after the last tick.
   void updatePhase(RunPhase phase) { gate_.update(phase); }
+  /// Current step after the last tick, from 0; none between two.
+  void updateStep(std::optional<std::uint32_t> step) { step_ = step; }
   /// TickOutput::commands of a tick; after updatePhase().
   void updateCommands(const CommandCounts& counts) { accepted_.update(counts, isOver(phase())); }
   /// Accepted commands that are not carried out, as sentences, since the last call.
@@ -185,6 +187,7 @@ class SessionRegistry {
   CommandGate gate_;
   std::vector<ClientId> kicked_;
   AcceptedCommands accepted_;  ///< to the state machine
+  std::optional<std::uint32_t> step_;
 };
 
 }  // namespace tenon::session

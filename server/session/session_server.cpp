@@ -11,6 +11,7 @@
 #include "idl/wire/network.h"
 #include "server/session/command_gate.h"
 #include "server/session/journal_writer.h"
+#include "server/session/loss_log.h"
 #include "server/session/resume.h"
 #include "server/session/seat_list.h"
 #include "server/session/server_wire.h"
@@ -27,8 +28,9 @@ using std::chrono::milliseconds;
 constexpr auto kFarewell = std::chrono::seconds(10);  // at most, for the last samples to reach all clients
 // for the hands of a resumed session, at most; those who come later get theirs then
 constexpr auto kReturn = milliseconds(1500);
-constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
-constexpr auto kStopTimeout = std::chrono::seconds(1);    // likewise, once a command ends the run
+constexpr auto kInputTimeout = std::chrono::seconds(30);    // in lockstep, for the input of a client
+constexpr auto kStopTimeout = std::chrono::seconds(1);      // likewise, once a command ends the run
+constexpr auto kJournalPatience = std::chrono::seconds(1);  // before it is said that its disk is awaited
 
 /// Those to the state machine.
 std::uint64_t countCommands(const TickInput& input) noexcept {
@@ -144,7 +146,8 @@ class Server final : public SessionServer {
   }
   Result<SessionReport> finish();
   void makeJournalWriter(std::optional<Journal> journal);
-  void noticeJournal();
+  void noticeJournal(bool is_last = false);
+  void endJournal(SessionReport& report);
   void print(const std::string& text) const {
     if (options_.print) options_.print(text);
   }
@@ -193,9 +196,9 @@ class Server final : public SessionServer {
   Tick resumed_after_ = 0;                     ///< SessionAnnounce::resumed_after
   std::vector<HandId> returning_;  ///< controlled when the server was killed that this one resumes
   std::optional<JournalWriter> journal_;
-  bool journal_ended_ = false;      ///< before the session, as was said
-  std::uint64_t lost_entries_ = 0;  ///< of the journal, as was said
-  std::uint64_t lost_copies_ = 0;   ///< likewise, of recorders
+  bool journal_ended_ = false;  ///< before the session, as was said
+  LossLog lost_entries_{"in the journal"};
+  LossLog lost_copies_{"in recordings"};
   std::uint64_t late_ticks_ = 0;
   std::uint64_t commands_taken_ = 0;  ///< CommandCounts::taken
   // real time
@@ -210,6 +213,12 @@ Result<void> Server::resume(const LoadedScene& loaded) {
   if (!point) return fail(point.error().what);
   resumed_entries_ = std::move(point->entries);
   if (!point->problem.empty()) print(point->problem);
+  if (point->tick > 0)
+    print(
+        fmt::format("{} reaches tick {} and records no end of the run: what the former server did after that "
+                    "tick is lost "
+                    "(of a kill some 20 ms, more where its disk hung)",
+                    options_.journal.string(), point->tick));
   auto seats = readSeats(seatFileOf(options_.journal));
   if (!seats) print(seats.error().what);
   for (std::uint32_t i = 0; i < loaded.scenario->hands.size(); ++i)
@@ -229,7 +238,7 @@ void Server::awaitReturn(const std::atomic<bool>& stop) {
   if (simulation_.emergencyStop()) wire_->raiseStop("it stood when the former server was killed");
   print(fmt::format("session '{}' is open again after tick {}", options_.name, simulation_.now()));
   wire_->log(Severity::kWarning, "resumed",
-             fmt::format("a new server continues the session after {:.3f} s",
+             fmt::format("a new server continues the session after {:.3f} s, as far as its journal reaches",
                          static_cast<double>(simulation_.now()) * kTickSeconds));
   const auto isBack = [this](HandId hand) { return registry_.controllerOf(hand).valid(); };
   const auto until = std::chrono::steady_clock::now() + kReturn;
@@ -334,13 +343,13 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   ticker.stop();
   late_ticks_ = ticker.lateTicks();
   over = true;
-  if (journal_) journal_->stop();
   for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
     publish(*output, outputs_.size() == 1);
     outputs_.pop();
   }
   // the queue was full in the last tick, which says how the run ended
   if (overflow_output_.tick == simulation_.now() && simulation_.now() > 0) publish(overflow_output_, true);
+  noticeJournal(true);
 }
 
 void Server::makeJournalWriter(std::optional<Journal> journal) {
@@ -350,31 +359,56 @@ void Server::makeJournalWriter(std::optional<Journal> journal) {
   journal_.emplace(std::move(journal), std::move(publish));
 }
 
-/// Says what the journal or recorders miss.
-void Server::noticeJournal() {
+/// Says what the journal or recorders miss; `is_last`: all that is not said yet.
+void Server::noticeJournal(bool is_last) {
   if (!journal_) return;
   if (const auto why = journal_->problem(); why && !std::exchange(journal_ended_, true))
     wire_->log(Severity::kError, "journal",
                fmt::format("the journal ends here, the session continues without it: {}", *why));
-  if (const std::uint64_t lost = journal_->lostEntries(); !journal_ended_ && lost > lost_entries_)
-    wire_->log(Severity::kError, "journal",
-               fmt::format("{} ticks are missing in the journal: the disk or the machine is too slow",
-                           lost - std::exchange(lost_entries_, lost)));
-  if (const std::uint64_t lost = journal_->lostCopies(); lost > lost_copies_)
-    wire_->log(Severity::kWarning, "journal",
-               fmt::format("{} ticks are missing in recordings: a recorder is too slow",
-                           lost - std::exchange(lost_copies_, lost)));
+  const auto now = std::chrono::steady_clock::now();
+  if (!journal_ended_)
+    if (const auto lost = lost_entries_.update(journal_->lostEntries(), now, is_last))
+      wire_->log(Severity::kError, "journal", *lost + ": the disk or the machine is too slow");
+  if (const auto lost = lost_copies_.update(journal_->lostCopies(), now, is_last))
+    wire_->log(Severity::kWarning, "journal", *lost + ": a recorder is too slow");
 }
 
 void Server::awaitPeople(const std::atomic<bool>& stop) {
   print(fmt::format("session '{}' is open{}, waiting for people", options_.name,
                     options_.resume ? " again" : ""));
-  std::optional<bool> published;  // whether a stop stands
+  std::optional<std::pair<bool, std::vector<std::string>>>
+      published;  // whether a stop stands, and who is missing
   while (!stop && !registry_.stopRequested() && !wire_->replaced() && !start_condition_.isMet(registry_)) {
-    if (const bool is_stopped = registry_.isStopEngaged(); published != is_stopped)
-      wire_->send(publisher_.eventGenerator().runBefore(published.emplace(is_stopped)));
+    std::pair now{registry_.isStopEngaged(), start_condition_.missing(simulation_.scenario(), registry_)};
+    if (published != now) {
+      wire_->send(publisher_.eventGenerator().runBefore(now.first, now.second));
+      published = std::move(now);
+    }
     wire_->dispatch(milliseconds(100));
   }
+}
+
+/// After the end is published, which waits for no disk.
+void Server::endJournal(SessionReport& report) {
+  journal_->end(report.run);
+  if (!journal_->isEndedWithin(kJournalPatience)) {
+    const auto signals = [this] { return options_.signals != nullptr ? options_.signals->load() : 0; };
+    const std::uint32_t before = signals();
+    print("waiting for the journal's disk; Ctrl-C ends the server without the rest of the journal");
+    while (!report.left_journal && !journal_->isEndedWithin(milliseconds(20)))
+      report.left_journal = signals() != before;
+  }
+  if (report.left_journal) {
+    journal_->leaveFile();
+    report.journal_problem = "its disk hangs, so that its end, which says how the run ended, may be missing";
+    if (const std::uint64_t waiting = journal_->waitingEntries(); waiting > 0)
+      report.journal_problem += fmt::format("; {} ticks still wait for it", waiting);
+  } else {
+    journal_->stop();
+    // a session that is over is over, whatever became of its journal
+    report.journal_problem = journal_->problem().value_or("");
+  }
+  report.lost_journal_ticks = journal_->lostEntries();
 }
 
 Result<SessionReport> Server::finish() {
@@ -392,18 +426,17 @@ Result<SessionReport> Server::finish() {
                                           : reason;
   report.run.steps_skipped = simulation_.step().skipped;
   report.run.steps_timed_out = simulation_.step().timed_out;
-  if (!simulation_.over() || reason.empty()) wire_->send(report.run);
+  if (!simulation_.over() || reason.empty()) {
+    wire_->send(report.run);
+    print(fmt::format("run: {}", report.run.reason));
+  }
   report.late_ticks = late_ticks_;
   report.refused_inputs = wire_->refusedInputs();
   report.dropped_outputs = outputs_.dropped();
   report.slow_writes = wire_->writes().slow;
   report.failed_writes = wire_->writes().failed;
   report.longest_write = wire_->writes().longest_seconds;
-  if (journal_) {
-    // a session that is over is over, whatever became of its journal
-    if (auto closed = journal_->close(report.run); !closed) report.journal_problem = closed.error().what;
-    report.lost_journal_ticks = journal_->lostEntries();
-  }
+  if (journal_) endJournal(report);
   if (wire_->replaced()) return fail(*wire_->replaced());
 
   wire_->statePublished();

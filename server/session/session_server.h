@@ -40,6 +40,9 @@ struct SessionOptions {
   SessionSimulationOptions simulation;
   /// Receives lines for the server's terminal, from the wire and the journal thread; may be empty.
   std::function<void(const std::string&)> print;
+  /// Number of signals to end that have come; one more while the journal's disk is awaited ends that wait.
+  /// None: nothing ends it.
+  const std::atomic<std::uint32_t>* signals = nullptr;
 };
 
 /// Outcome of a session.
@@ -54,6 +57,9 @@ struct SessionReport {
   double longest_write = 0.0;            ///< [s]
   std::uint64_t lost_journal_ticks = 0;  ///< missing in the journal: its disk was too slow
   std::string journal_problem;           ///< why the journal ended before the session; or empty
+  /// The disk hangs with the rest of the journal and is not awaited: the process ends without destroying the
+  /// server, whose destructor would wait.
+  bool left_journal = false;
 };
 
 /// The server of one training session: announces it over DDS, accepts clients, runs ticks in real time or in

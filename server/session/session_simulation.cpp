@@ -9,8 +9,8 @@
 namespace tenon::session {
 namespace {
 
-/// Without a reading for longer, a hand is told to others as one that stands. Of sparse inputs each tick has
-/// one (ReadingPlayout); near the server so many are not lost in a row.
+/// After this many ticks without a reading its velocity is published as zero. Of sparse inputs each tick has
+/// a reading (ReadingPlayout); near the server so many are not lost in a row.
 constexpr Tick kLateTicks = kMostInputPeriod;  // [ticks]
 
 /// [points] of ChangeKind::kBudget; 0, no limit, for NaN and numbers below 1.

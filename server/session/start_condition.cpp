@@ -25,6 +25,16 @@ bool StartCondition::isMet(const SessionRegistry& registry) const {
          std::all_of(roles.begin(), roles.end(), [&](Role role) { return registry.isRolePresent(role); });
 }
 
+std::vector<std::string> StartCondition::missing(const game_control::ScenarioFile& scenario,
+                                                 const SessionRegistry& registry) const {
+  std::vector<std::string> names;
+  for (const HandId hand : hands)
+    if (!registry.controllerOf(hand).valid()) names.push_back(scenario.hands[hand.value].name);
+  for (const Role role : roles)
+    if (!registry.isRolePresent(role)) names.emplace_back(roleName(role));
+  return names;
+}
+
 Result<StartCondition> StartCondition::make(const game_control::ScenarioFile& scenario,
                                             const std::vector<std::string>& names) {
   StartCondition all;

@@ -22,6 +22,9 @@ struct StartCondition {
   [[nodiscard]] static Result<StartCondition> make(const game_control::ScenarioFile& scenario,
                                                    const std::vector<std::string>& names);
   [[nodiscard]] bool isMet(const SessionRegistry& registry) const;
+  /// Names of the hands and roles that are not present, as `--wait-for` has them.
+  [[nodiscard]] std::vector<std::string> missing(const game_control::ScenarioFile& scenario,
+                                                 const SessionRegistry& registry) const;
 };
 
 /// All hands of the role trainee, coupled and tracked.

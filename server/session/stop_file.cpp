@@ -107,8 +107,8 @@ Result<StopTruth> readStopFile(const std::filesystem::path& file) {
 Result<void> writeStopFile(const std::filesystem::path& file, const StopTruth& truth) {
   if (file.empty()) return {};
   std::string text;
-  for (const auto& [id, stop] : truth.standing()) text += lineOf("raise", stop);
-  for (const auto& [id, cleared] : truth.cleared()) text += lineOf("clear", cleared);
+  for (const auto& [client, stop] : truth.standing()) text += lineOf("raise", stop);
+  for (const auto& [client, cleared] : truth.cleared()) text += lineOf("clear", cleared);
   text += endOf(text);
   std::error_code ignored;
   std::filesystem::create_directories(file.parent_path(), ignored);

@@ -24,28 +24,31 @@ namespace tenon::session {
 ///
 /// Raises beyond the bounds of StopTruth are published as cleared: those before them stand.
 ///
+/// A stop that stands at its start is raised once more, by the server: who was told of a clear that had not
+/// come into the file hears no raise of before any more, and must be told that it stands again.
+///
 /// Threads: one (wire), which never waits for the disk; another one, of this object, writes the file.
 /// Real-time: no.
 class StopKeeper {
  public:
-  /// `file`: empty: only in memory. `writers` must outlive this.
-  StopKeeper(std::filesystem::path file, ServerWriters& writers);
+  /// `file`: empty: only in memory. `writers` must outlive this. `server_epoch`: by which raises have other
+  /// numbers than in a former life of the server.
+  StopKeeper(std::filesystem::path file, ServerWriters& writers, std::uint32_t server_epoch);
 
-  /// Takes what the file has, and publishes it. Fails when the file is damaged.
+  /// Takes what the file has, raises it again if it stands, and publishes it. Fails when the file is damaged.
   [[nodiscard]] Result<void> restore();
   /// True when this raise is new (StopTruth): then publish() follows, once the simulation is stopped.
   [[nodiscard]] StopChange raise(const EmergencyStop& stop) { return note(truth_.raise(stop)); }
-  /// Of what raise() has told: as a raise that stands, or as superfluous.
-  void publish(const EmergencyStop& stop);
+  /// Of what raise() has told: as a raise that stands, in place of its client's former one, or as
+  /// superfluous.
+  void publish(const EmergencyStop& stop, const StopChange& change);
   /// Clears all raises that stand, and those alone: one that is on its way will stand.
   void clear(const std::string& who, const std::string& reason);
   [[nodiscard]] bool engaged() const { return truth_.engaged(); }
   [[nodiscard]] const NewestRaise& newest() const { return newest_; }
-  [[nodiscard]] const std::map<RaiseId, EmergencyStop>& standing() const { return truth_.standing(); }
-  /// Whether this raise was cleared before: it would not stand.
-  [[nodiscard]] bool wasCleared(const EmergencyStop& stop) const {
-    return truth_.cleared().contains({stop.client_guid, stop.counter});
-  }
+  [[nodiscard]] const StopTruth& truth() const { return truth_; }
+  /// A raise of the server's own; each has a larger number than those of former lives.
+  [[nodiscard]] EmergencyStop ownRaise(const std::string& reason) const;
   /// One turn of the wire thread: publishes the clears that are in the file by now.
   void step();
   /// Something waits for the next turn.
@@ -60,6 +63,7 @@ class StopKeeper {
 
   std::filesystem::path file_;
   ServerWriters& writers_;
+  std::uint32_t server_epoch_;
   StopTruth truth_;
   NewestRaise newest_;
   bool has_changed_ = false;  ///< since the newest state that the file was given

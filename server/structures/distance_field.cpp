@@ -1,6 +1,7 @@
 #include "server/structures/distance_field.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace tenon::structures {
@@ -175,6 +176,33 @@ bool DistanceField::cellAt(const Vector3& p_MP, FieldCell& cell) const noexcept 
     brick = children[r * r * r];
   }
   return take(brick, location.p_brick, layout_.voxel, layout_.band);
+}
+
+std::span<const ValleyPlane> DistanceField::planesIn(Entry brick, const Vector3& p_brick) const noexcept {
+  const std::int32_t number = layout_.valley_index[static_cast<std::size_t>(brick)];
+  if (number == kNoValley) return {};
+  const ValleyBrick& valley = layout_.valley_bricks[static_cast<std::size_t>(number)];
+  const Eigen::Vector3i cell = (p_brick * kBrickVoxels).cast<int>().cwiseMin(kBrickVoxels - 1);
+  const auto z = static_cast<std::size_t>(cell.z());
+  const auto bit = static_cast<unsigned>(cell.y() * kBrickVoxels + cell.x());
+  if ((valley.cells[z] >> bit & 1U) == 0) return {};
+  auto before = static_cast<std::size_t>(std::popcount(valley.cells[z] & ((std::uint64_t{1} << bit) - 1U)));
+  for (std::size_t k = 0; k < z; ++k) before += static_cast<std::size_t>(std::popcount(valley.cells[k]));
+  const std::uint32_t planes = layout_.valley_cells[valley.first + before];
+  return layout_.valley_planes.subspan(planes / kMaxValleyPlanes, planes % kMaxValleyPlanes + 1);
+}
+
+std::span<const ValleyPlane> DistanceField::planesAt(const Vector3& p_MP) const noexcept {
+  BrickLocation location;
+  if (layout_.valley_index.empty() || !locate(p_MP, location) || location.entry < 0) return {};
+  if (location.entry < kRefined) return planesIn(location.entry, location.p_brick);
+  // cells with planes are near the surface, where children have samples
+  const int r = layout_.refinement;
+  const Vector3 p = location.p_brick * r;
+  const Eigen::Vector3i child = p.cast<int>().cwiseMin(r - 1);
+  const Entry fine = layout_.index[static_cast<std::size_t>((location.entry - kRefined) +
+                                                            (child.z() * r + child.y()) * r + child.x())];
+  return fine < 0 ? std::span<const ValleyPlane>() : planesIn(fine, p - child.cast<double>());
 }
 
 FieldSample DistanceField::undilated(const Vector3& p_MP) const noexcept {

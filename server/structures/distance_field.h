@@ -20,6 +20,23 @@ struct FieldSample {
   bool exact = false;
 };
 
+/// A plane of the surface beside a concave edge.
+struct ValleyPlane {
+  Vector3f n_M = Vector3f::Zero();  ///< [-] unit normal, into free space
+  float offset = 0.0F;              ///< [m] distance of the grid's lowest corner from it
+
+  /// [m] Of a point `p_FoP_M` from the grid's lowest corner.
+  [[nodiscard]] double distance(const Vector3& p_FoP_M) const {
+    return n_M.cast<double>().dot(p_FoP_M) + static_cast<double>(offset);
+  }
+};
+
+/// The cells of a brick that have planes.
+struct ValleyBrick {
+  std::uint32_t first = 0;               ///< in `Layout::valley_cells`, of the lowest of them
+  std::array<std::uint64_t, 8> cells{};  ///< one word per z, bit y * 8 + x
+};
+
 /// The cell that is interpolated at one point.
 struct FieldCell {
   std::array<double, 8> samples{};   ///< [voxels] at its corners, x fastest
@@ -94,7 +111,18 @@ class DistanceField {
     /// [m] Dilation at the corners of the coarse bricks (x fastest), one more along each axis than there are
     /// bricks. Empty: none anywhere.
     std::span<const float> dilations;
+    /// Where the surface in a cell is concave and made of a few planes, these: free space is outside of all
+    /// of them, so the distance is the smallest one of those to the planes, while interpolation rounds it
+    /// off. Per brick of samples the number of its ValleyBrick, or kNoValley; empty: there are none.
+    std::span<const std::int32_t> valley_index;
+    std::span<const ValleyBrick> valley_bricks;
+    /// Per cell with planes: the number of its first plane times kMaxValleyPlanes, plus that of its planes
+    /// less one.
+    std::span<const std::uint32_t> valley_cells;
+    std::span<const ValleyPlane> valley_planes;
   };
+  static constexpr std::int32_t kNoValley = -1;
+  static constexpr std::uint32_t kMaxValleyPlanes = 4;  ///< of a cell
 
   DistanceField() = default;
   /// `owner` keeps the memory of the spans alive.
@@ -123,6 +151,10 @@ class DistanceField {
   /// The cell that sample() interpolates at a point; false where that is not `exact`.
   [[nodiscard]] bool cellAt(const Vector3& p_MP, FieldCell& cell) const noexcept;
 
+  /// The planes that are the surface in the cell of a point, see Layout::valley_planes; empty where there
+  /// are none.
+  [[nodiscard]] std::span<const ValleyPlane> planesAt(const Vector3& p_MP) const noexcept;
+
   /// [m] Edge of the voxels that sample() interpolates at p.
   [[nodiscard]] double voxelAt(const Vector3& p_MP) const noexcept;
 
@@ -132,6 +164,8 @@ class DistanceField {
   [[nodiscard]] double dilation() const { return layout_.dilation; }
   [[nodiscard]] double slope() const { return layout_.slope; }
   [[nodiscard]] bool empty() const { return layout_.index.empty(); }
+  /// Whether some cells have planes, see planesAt().
+  [[nodiscard]] bool hasPlanes() const { return !layout_.valley_index.empty(); }
   [[nodiscard]] Eigen::AlignedBox3d box() const;
 
  private:
@@ -142,6 +176,8 @@ class DistanceField {
   /// level.
   [[nodiscard]] bool interpolate(Entry brick, const Vector3& p_brick, double voxel, double band,
                                  FieldSample& sample) const noexcept;
+  /// planesAt() `p_brick` [bricks] in a brick of samples.
+  [[nodiscard]] std::span<const ValleyPlane> planesIn(Entry brick, const Vector3& p_brick) const noexcept;
   /// [m] A lower bound of |distance| in a brick without samples.
   [[nodiscard]] double farMagnitude(const BrickLocation& location) const noexcept;
   /// [m] Dilation at `p_brick` [bricks] in the coarse brick with coordinates x, y, z.

@@ -57,6 +57,10 @@ DistanceField::Layout layoutOf(const FieldStorage& storage) {
   layout.samples = storage.samples;
   layout.far = storage.far;
   layout.dilations = storage.dilations;
+  layout.valley_index = storage.valley_index;
+  layout.valley_bricks = storage.valley_bricks;
+  layout.valley_cells = storage.valley_cells;
+  layout.valley_planes = storage.valley_planes;
   return layout;
 }
 
@@ -67,6 +71,45 @@ DistanceField viewOf(const FieldStorage& storage) { return {layoutOf(storage), n
 DistanceField makeField(FieldStorage storage) {
   const auto owner = std::make_shared<const FieldStorage>(std::move(storage));
   return {layoutOf(*owner), owner};
+}
+
+DistanceField withValleys(const DistanceField& field, std::span<const BrickValleys> valleys) {
+  if (valleys.empty()) return field;
+  struct Owner {
+    FieldStorage valleys;
+    DistanceField field;
+  };
+  const auto owner = std::make_shared<Owner>();
+  owner->field = field;
+  FieldStorage& storage = owner->valleys;
+  storage.valley_index.assign(field.layout().samples.size() / DistanceField::kBrickSamples,
+                              DistanceField::kNoValley);
+  for (const BrickValleys& brick : valleys) {
+    storage.valley_index[static_cast<std::size_t>(brick.brick)] =
+        static_cast<std::int32_t>(storage.valley_bricks.size());
+    storage.valley_bricks.push_back({static_cast<std::uint32_t>(storage.valley_cells.size()), brick.cells});
+    // neighbouring cells mostly have the same planes
+    const std::size_t first_of_brick = storage.valley_planes.size();
+    for (const auto& planes : brick.planes) {
+      const auto same = [](const ValleyPlane& a, const ValleyPlane& b) {
+        return a.n_M == b.n_M && a.offset == b.offset;
+      };
+      const auto found =
+          std::search(storage.valley_planes.begin() + static_cast<std::ptrdiff_t>(first_of_brick),
+                      storage.valley_planes.end(), planes.begin(), planes.end(), same);
+      const auto first = static_cast<std::uint32_t>(found - storage.valley_planes.begin());
+      if (found == storage.valley_planes.end())
+        storage.valley_planes.insert(storage.valley_planes.end(), planes.begin(), planes.end());
+      storage.valley_cells.push_back(first * DistanceField::kMaxValleyPlanes +
+                                     static_cast<std::uint32_t>(planes.size()) - 1);
+    }
+  }
+  DistanceField::Layout layout = field.layout();
+  layout.valley_index = storage.valley_index;
+  layout.valley_bricks = storage.valley_bricks;
+  layout.valley_cells = storage.valley_cells;
+  layout.valley_planes = storage.valley_planes;
+  return {layout, owner};
 }
 
 FieldStorage makeGrid(const Eigen::AlignedBox3d& surface_box_M, double voxel) {

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <span>
+#include <vector>
 
+#include "idl/types/fixed_vector.h"
 #include "server/structures/distance_field.h"
 #include "server/structures/huge_pages.h"
 
@@ -17,6 +20,18 @@ struct FieldStorage {
   HugeVector<std::int16_t> samples;
   HugeVector<std::int16_t> far;
   HugeVector<float> dilations;
+  HugeVector<std::int32_t> valley_index;
+  HugeVector<ValleyBrick> valley_bricks;
+  HugeVector<std::uint32_t> valley_cells;
+  HugeVector<ValleyPlane> valley_planes;
+};
+
+/// The planes of one brick's cells.
+struct BrickValleys {
+  DistanceField::Entry brick = 0;
+  std::array<std::uint64_t, 8> cells{};  ///< as in ValleyBrick
+  /// Of these cells in order.
+  std::vector<FixedVector<ValleyPlane, DistanceField::kMaxValleyPlanes>> planes;
 };
 
 /// A field on arrays that the caller keeps as they are while it is used.
@@ -29,6 +44,9 @@ struct FieldStorage {
 /// samples, which have none yet. A child of a refined brick whose samples do not reach that far is dropped:
 /// its coarse samples are used.
 [[nodiscard]] DistanceField makeDilatedField(FieldStorage storage, std::span<const float> dilations);
+
+/// The same field with planes in some cells; `valleys` by brick, in ascending order.
+[[nodiscard]] DistanceField withValleys(const DistanceField& field, std::span<const BrickValleys> valleys);
 
 /// A grid of far-outside bricks with edge `voxel` [m] around `surface_box_M`, with one brick of margin on
 /// every side.

@@ -1,6 +1,7 @@
 #include "server/structures/structure_checks.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -90,6 +91,39 @@ Problem problemOfDilations(const DistanceField::Layout& field) {
   return {};
 }
 
+/// Each brick and each cell has its planes, in order, or there are none.
+Problem problemOfValleys(const DistanceField::Layout& field) {
+  const std::size_t bricks = field.samples.size() / DistanceField::kBrickSamples;
+  if (field.valley_index.size() != (field.valley_bricks.empty() ? 0 : bricks))
+    return "does not have one entry of valleys for each brick";
+  std::size_t next_brick = 0;
+  for (const std::int32_t number : field.valley_index) {
+    if (number == DistanceField::kNoValley) continue;
+    if (number < 0 || static_cast<std::size_t>(number) != next_brick++)
+      return "has valleys out of order or out of range";
+  }
+  if (next_brick != field.valley_bricks.size()) return "has valleys that no brick refers to";
+  std::size_t next_cell = 0;
+  for (const ValleyBrick& brick : field.valley_bricks) {
+    if (brick.first != next_cell) return "has valleys out of order or out of range";
+    for (const std::uint64_t word : brick.cells) next_cell += static_cast<std::size_t>(std::popcount(word));
+  }
+  if (next_cell != field.valley_cells.size()) return "has valleys in other cells than planes";
+  const bool in_range =
+      std::all_of(field.valley_cells.begin(), field.valley_cells.end(), [&field](std::uint32_t planes) {
+        return std::size_t{planes / DistanceField::kMaxValleyPlanes} +
+                   planes % DistanceField::kMaxValleyPlanes <
+               field.valley_planes.size();
+      });
+  const bool sound =
+      std::all_of(field.valley_planes.begin(), field.valley_planes.end(), [](const ValleyPlane& plane) {
+        return std::abs(plane.n_M.norm() - 1.0F) < 0.01F &&
+               std::abs(static_cast<double>(plane.offset)) <= kMaxCoordinate;
+      });
+  if (!in_range || !sound) return "has planes of valleys out of range";
+  return {};
+}
+
 bool contains(const ShellSphere& sphere, std::span<const ShellPoint> points) {
   const Vector3 p_MC = sphere.p_MC.cast<double>();
   if (!plausible(p_MC) || !(sphere.radius >= 0.0F) || !std::isfinite(sphere.radius)) return false;
@@ -130,7 +164,9 @@ Problem problemOfLevels(const Pointshell::Layout& shell) {
 
 Problem problemOf(const DistanceField::Layout& field) {
   if (field.index.empty()) {
-    if (field.samples.empty() && field.far.empty() && field.dilations.empty()) return {};
+    if (field.samples.empty() && field.far.empty() && field.dilations.empty() && field.valley_index.empty() &&
+        field.valley_bricks.empty() && field.valley_cells.empty() && field.valley_planes.empty())
+      return {};
     return "has samples but no index";
   }
   const auto positive = [](double length) { return length > 0.0 && length <= kMaxCoordinate; };
@@ -155,7 +191,8 @@ Problem problemOf(const DistanceField::Layout& field) {
     return "has more bricks than queries can address (" + std::to_string(DistanceField::kMaxBricks) +
            " with samples, " + std::to_string(DistanceField::kMaxIndexEntries) + " in all)";
   if (auto problem = problemOfDilations(field)) return problem;
-  return IndexCheck(field).problem(coarse);
+  if (auto problem = IndexCheck(field).problem(coarse)) return problem;
+  return problemOfValleys(field);
 }
 
 Problem problemOf(const Pointshell::Layout& shell) {

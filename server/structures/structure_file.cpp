@@ -24,7 +24,7 @@ namespace tenon::structures {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 10;
+constexpr std::uint32_t kVersion = 11;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -48,6 +48,10 @@ enum FileSection : std::size_t {
   kFeatureLevels,
   kFeatureEdges,
   kFilled,
+  kValleyIndex,
+  kValleyBricks,
+  kValleyCells,
+  kValleyPlanes,
   kSections
 };
 constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField::Entry),
@@ -67,7 +71,11 @@ constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField:
                                                            sizeof(ShellSphere),
                                                            sizeof(ShellLevel),
                                                            sizeof(FeatureEdge),
-                                                           sizeof(FilledSpace)};
+                                                           sizeof(FilledSpace),
+                                                           sizeof(std::int32_t),
+                                                           sizeof(ValleyBrick),
+                                                           sizeof(std::uint32_t),
+                                                           sizeof(ValleyPlane)};
 
 struct FileHeader {
   std::array<char, 8> magic = kMagic;
@@ -86,7 +94,8 @@ struct FileHeader {
 };
 static_assert(std::is_trivially_copyable_v<FileHeader>);
 static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(ShellLevel) == 32 &&
-              sizeof(FeatureEdge) == 64 && sizeof(FilledSpace) == 28);
+              sizeof(FeatureEdge) == 64 && sizeof(FilledSpace) == 28 && sizeof(ValleyBrick) == 72 &&
+              sizeof(ValleyPlane) == 16);
 
 std::uint64_t aligned(std::uint64_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 
@@ -139,7 +148,11 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
           bytes(features.clusters()),
           bytes(features.levels()),
           bytes(structures.features.edges()),
-          bytes(info.filled)};
+          bytes(info.filled),
+          bytes(field.valley_index),
+          bytes(field.valley_bricks),
+          bytes(field.valley_cells),
+          bytes(field.valley_planes)};
 }
 
 FileHeader headerOf(const HapticStructures& structures) {
@@ -350,6 +363,10 @@ Result<std::shared_ptr<const HapticStructures>> readStructures(std::span<const s
   copySection(bytes, *header, kSamples, field.samples);
   copySection(bytes, *header, kFar, field.far);
   copySection(bytes, *header, kDilations, field.dilations);
+  copySection(bytes, *header, kValleyIndex, field.valley_index);
+  copySection(bytes, *header, kValleyBricks, field.valley_bricks);
+  copySection(bytes, *header, kValleyCells, field.valley_cells);
+  copySection(bytes, *header, kValleyPlanes, field.valley_planes);
   ShellStorage shell;
   copySection(bytes, *header, kPoints, shell.points);
   copySection(bytes, *header, kLeaves, shell.leaves);

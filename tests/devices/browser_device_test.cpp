@@ -80,6 +80,26 @@ TEST_F(BrowserDeviceTest, APageThatHangsReleasesTheDeadMansSwitchAndIsGoneLater)
   EXPECT_TRUE(device_.isGone());
 }
 
+TEST_F(BrowserDeviceTest, AnArmingButtonThatIsDownFromTheFirstMessageIsNotPressed) {
+  RemoteTarget pressed = targetAt(Vector3::Zero());
+  pressed.buttons |= kRemoteArm;
+  device_.move(pressed);  // before the first cycle
+  EXPECT_EQ(led(10, pressed).buttons, kRemoteHeld);
+  led(1, targetAt(Vector3::Zero()));
+  EXPECT_EQ(led(1, pressed).buttons, pressed.buttons);
+}
+
+TEST_F(BrowserDeviceTest, AnArmingButtonThatWasHeldWhileThePageHungIsNotPressed) {
+  RemoteTarget pressed = targetAt(Vector3::Zero());
+  pressed.buttons |= kRemoteArm;
+  led(1, targetAt(Vector3::Zero()));
+  EXPECT_EQ(led(10, pressed).buttons, pressed.buttons);
+  cycles(BrowserDevice::kLimits.silent);
+  EXPECT_EQ(led(10, pressed).buttons, kRemoteHeld);
+  led(1, targetAt(Vector3::Zero()));
+  EXPECT_EQ(led(1, pressed).buttons, pressed.buttons);
+}
+
 TEST_F(BrowserDeviceTest, ACycleAllocatesNothingAndLocksNothing) {
   led(10, targetAt(Vector3(0.1, 0.0, 0.0)));
   const test::RealtimeGuard guard;

@@ -42,6 +42,30 @@ TEST(Catalog, TellsTheCapabilitiesOfADevice) {
   EXPECT_FALSE(capsOf("sigma8"));
 }
 
+TEST(Catalog, OpensTheDeviceOfASerialNumber) {
+  const auto one = std::move(*openDevice("falcon-sim", {.serial = "1001"}));
+  const auto other = std::move(*openDevice("falcon-sim", {.serial = "1002"}));
+  EXPECT_EQ(one->caps().serial, "1001");
+  EXPECT_EQ(other->caps().serial, "1002");
+  EXPECT_EQ((*openDevice("falcon-sim"))->caps().serial, "1001") << "the first one found";
+  EXPECT_EQ((*openBimanualDevice("hug-sim", {.serial = "1003"}))->left().caps().serial, "1003");
+  EXPECT_EQ((*openDevice("vibrotac-sim", {.serial = "1002"}))->caps().serial, "1002");
+  EXPECT_NE(unitSeed(1, "1001"), unitSeed(1, "1002")) << "units differ";
+}
+
+TEST(Catalog, ASerialNumberThatIsNotThereIsRefusedWithThoseThatAre) {
+  const auto device = openDevice("sigma7-sim", {.serial = "77"});
+  ASSERT_FALSE(device);
+  EXPECT_EQ(device.error().what,
+            "device 'sigma7-sim': none with serial number '77' is there; there are: 1001, 1002, 1003, 1004");
+  const auto pair = openBimanualDevice("hug-sim", {.serial = "77"});
+  ASSERT_FALSE(pair);
+  EXPECT_THAT(pair.error().what, HasSubstr("there are: 1001"));
+  const auto remote = openDevice("remote", {.serial = "1001"});
+  ASSERT_FALSE(remote);
+  EXPECT_EQ(remote.error().what, "device 'remote': has no serial number, so none can be asked for");
+}
+
 TEST(Catalog, ABimanualDeviceIsNotOpenedForOneHand) {
   const auto device = openDevice("hug-sim");
   ASSERT_FALSE(device);

@@ -1,3 +1,4 @@
+#include <chrono>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -81,6 +82,17 @@ std::vector<CatalogDevice> everyHeldDevice() {
     if (HapticDevice* const device = entry.open(); device && simulatedHumanArm(*device))
       held.push_back(entry);
   return held;
+}
+
+TEST_P(Conformance, ANumberThatChangesSaysThatAReadingIsNew) {
+  const DeviceState first = read();
+  EXPECT_NE(read().seq, first.seq) << "a hand whose readings keep their number loses its force";
+}
+
+TEST_P(Conformance, OneThatDoesNotPaceIsNotWaitedFor) {
+  if (!device_->paces()) {
+    EXPECT_FALSE(device_->awaitReading(std::chrono::hours(1)));
+  }
 }
 
 TEST_P(Conformance, ReportsConsistentCapabilities) {

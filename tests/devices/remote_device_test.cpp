@@ -131,6 +131,54 @@ TEST_F(RemoteDeviceTest, ASilentPeerHasReleasedTheDeadMansSwitchAndMakesRoomLate
   EXPECT_TRUE(device_->connected());
 }
 
+TEST_F(RemoteDeviceTest, AnArmingButtonThatWasHeldOverASilenceIsNotPressed) {
+  constexpr std::uint32_t kBoth = kRemoteHeld | kRemoteArm;
+  auto peer = std::make_unique<RemotePeer>(path_);
+  const auto buttonsAfter = [&](std::uint32_t buttons) {
+    peer->send(Vector3::Zero(), buttons);
+    return cycles(1).buttons;
+  };
+  buttonsAfter(kRemoteHeld);
+  EXPECT_EQ(buttonsAfter(kBoth), kBoth);
+  cycles(RemoteDevice::kSilent);
+  EXPECT_EQ(buttonsAfter(kBoth), kRemoteHeld) << "nobody saw it go up";
+  EXPECT_EQ(buttonsAfter(kBoth), kRemoteHeld);
+  EXPECT_EQ(buttonsAfter(kRemoteHeld), kRemoteHeld);
+  EXPECT_EQ(buttonsAfter(kBoth), kBoth);
+  peer.reset();
+  cycles(2);
+  peer = std::make_unique<RemotePeer>(path_);
+  EXPECT_EQ(buttonsAfter(kBoth), kRemoteHeld) << "likewise after a new connection";
+}
+
+// it connects while the station starts, before the device is read for the first time
+TEST_F(RemoteDeviceTest, AnArmingButtonThatIsDownFromTheFirstMessageIsNotPressed) {
+  constexpr std::uint32_t kBoth = kRemoteHeld | kRemoteArm;
+  RemotePeer peer(path_);
+  for (const std::uint32_t buttons : {kBoth, kBoth}) {
+    peer.send(Vector3::Zero(), buttons);
+    EXPECT_EQ(cycles(1).buttons, kRemoteHeld);
+  }
+  peer.send(Vector3::Zero());
+  EXPECT_EQ(cycles(1).buttons, kRemoteHeld);
+  peer.send(Vector3::Zero(), kBoth);
+  EXPECT_EQ(cycles(1).buttons, kBoth);
+}
+
+// no cycle in between is without a peer
+TEST_F(RemoteDeviceTest, AnArmingButtonThatWasUpWithThePeerBeforeIsNotPressedByTheNextOne) {
+  auto first = std::make_unique<RemotePeer>(path_);
+  first->send(Vector3::Zero());
+  DeviceState state;
+  device_->read(state);
+  EXPECT_EQ(state.buttons, kRemoteHeld);
+  first.reset();
+  device_->write({});
+  RemotePeer next(path_);
+  next.send(Vector3::Zero(), kRemoteHeld | kRemoteArm);
+  EXPECT_EQ(cycles(1).buttons, kRemoteHeld);
+}
+
 TEST_F(RemoteDeviceTest, HasOnePeerAtATimeAndTheNextOneComesWhereTheHandIs) {
   auto first = std::make_unique<RemotePeer>(path_);
   first->send(Vector3(0.1, 0.0, 0.0));

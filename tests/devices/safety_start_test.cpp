@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -87,6 +88,111 @@ TEST(Safety, AForceThatStartsFromNothingIsAtMostThreeNewtonForASecond) {
   EXPECT_NEAR(output.F_Ho_D.force.norm(), 5.0, 0.1) << "20 N/s until it is the requested one";
 }
 
+SafetyRequest requestTorque(double torque) {
+  SafetyRequest request;
+  request.requested.F_Ho_D.torque = {0.0, torque, 0.0};
+  return request;
+}
+
+struct TorqueStart {
+  DeviceCaps caps;
+  double most;    // [Nm]
+  double growth;  // [Nm/s]
+};
+
+//  |M|                  after a second the torque goes on to the requested one
+//        .-----------/
+//      .'
+TEST(Safety, ATorqueThatStartsFromNothingIsSmallForASecond) {
+  for (const TorqueStart& start : {TorqueStart{kHug, 0.3, 2.0}, TorqueStart{kSigma, 0.06, 0.4}}) {
+    Safety safety(start.caps);
+    double last = 0.0;
+    for (int tick = 0; tick < 8000; ++tick) {
+      const double now = safety.step(requestTorque(35.0), armed(), kTick).F_Ho_D.torque.norm();
+      ASSERT_LE(now - last, start.growth * kTick + 1e-9) << tick;
+      if (tick < 1000) {
+        ASSERT_LE(now, start.most + 1e-9) << tick;
+      }
+      if (tick == 999) {
+        EXPECT_NEAR(now, start.most, 1e-9);
+      }
+      last = now;
+    }
+    EXPECT_NEAR(last, start.caps.torque, 1e-9);
+  }
+}
+
+TEST(Safety, ATorqueComesBackUpToWhatItWasBefore) {
+  Safety safety(kHug);
+  for (int tick = 0; tick < 4000; ++tick) (void)safety.step(requestTorque(2.0), armed(), kTick);
+  SafetyRequest request = requestTorque(2.0);
+  request.restart = true;
+  for (int tick = 0; tick < 25; ++tick) (void)safety.step(request, armed(), kTick);
+  double last = 0.0;
+  for (int tick = 0; tick < 975; ++tick) {
+    last = safety.step(requestTorque(9.0), armed(), kTick).F_Ho_D.torque.norm();
+    ASSERT_LE(last, 2.0 + 1e-9) << tick;
+  }
+  EXPECT_GT(last, 1.5);
+}
+
+//  |F| --.                  .--    a torque that still grows after the first gap keeps no force of before it:
+//        '._____free_____._'      after the second one the force starts as one that was free
+//  |M| --.        .----------
+//        '.___.-'         '.__
+TEST(Safety, AForceThatIsFreeWhileATorqueStillGrowsStartsFromNothingAfterTheNextGap) {
+  Safety safety = settled(kHug, {0.0, 0.0, 8.0});
+  const auto push = [&](double force, double torque, double age) {
+    SafetyRequest request = requestForce({0.0, 0.0, force}, age);
+    request.requested.F_Ho_D.torque = {0.0, torque, 0.0};
+    return safety.step(request, armed(), kTick).F_Ho_D;
+  };
+  for (int tick = 0; tick < 800; ++tick) (void)push(8.0, 9.0, 0.2);
+  Wrench free;
+  for (int tick = 0; tick < 1400; ++tick) free = push(0.25, 9.0, 0.0);
+  EXPECT_NEAR(free.force.norm(), 0.25, 1e-9);
+  EXPECT_LT(free.torque.norm(), 2.0) << "it still grows";
+  for (int tick = 0; tick < 800; ++tick) (void)push(8.0, 9.0, 0.2);
+  double last = 0.0;
+  for (int tick = 0; tick < 999; ++tick) {
+    last = push(8.0, 9.0, 0.0).force.norm();
+    ASSERT_LE(last, 3.0 + 1e-9) << tick;
+  }
+  EXPECT_NEAR(last, 3.0, 1e-9);
+}
+
+TEST(Safety, ATorqueThatIsFreeWhileAForceStillGrowsStartsFromNothingAfterTheNextGap) {
+  Safety safety(kHug);
+  const auto push = [&](double force, double torque, double age) {
+    SafetyRequest request = requestForce({0.0, 0.0, force}, age);
+    request.requested.F_Ho_D.torque = {0.0, torque, 0.0};
+    return safety.step(request, armed(), kTick).F_Ho_D;
+  };
+  for (int tick = 0; tick < 4000; ++tick) (void)push(0.0, 2.0, 0.0);
+  for (int tick = 0; tick < 800; ++tick) (void)push(0.0, 2.0, 0.2);
+  for (int tick = 0; tick < 1400; ++tick) (void)push(40.0, 0.1, 0.0);
+  for (int tick = 0; tick < 800; ++tick) (void)push(40.0, 2.0, 0.2);
+  for (int tick = 0; tick < 999; ++tick) ASSERT_LE(push(40.0, 2.0, 0.0).torque.norm(), 0.3 + 1e-9) << tick;
+}
+
+TEST(Safety, AfterARequestThatWasNoNumberTheForceStartsSoftly) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (const bool of_stiffness : {false, true}) {
+    Safety safety = settled(kHug, {40.0, 0.0, 0.0});
+    SafetyRequest bad = requestForce({of_stiffness ? 40.0 : kNan, 0.0, 0.0});
+    if (of_stiffness) bad.stiffness = kNan;
+    EXPECT_EQ(safety.step(bad, armed(), kTick).F_Ho_D.force.norm(), 0.0);
+    double last = 0.0;
+    for (int tick = 0; tick < 999; ++tick) {
+      const double now = safety.step(requestForce({40.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.norm();
+      ASSERT_LE(now - last, 0.020 + 1e-9) << tick;
+      ASSERT_LE(now, 3.0 + 1e-9) << tick;
+      last = now;
+    }
+    EXPECT_NEAR(last, 3.0, 1e-9);
+  }
+}
+
 TEST(Safety, ALongStepLetsAForceGrowAsTwoMilliseconds) {
   Safety safety = settled(kSigma, {2.0, 0.0, 0.0});
   EXPECT_NEAR(safety.step(requestForce({10.0, 0.0, 0.0}), armed(), 0.3).F_Ho_D.force.x(), 3.0, 1e-9)
@@ -137,17 +243,44 @@ TEST(Safety, RampsTheForceOverASecondAfterArming) {
 TEST(Safety, TheEndOfTheWorkspaceRampsAfterArming) {
   Safety safety(kHug);
   DeviceState state = armed();
-  state.X_DH.translation() = {0.0, 0.0, 0.95 * 0.40 + 0.02};  // armed 20 mm beyond the edge
+  state.X_DH.translation() = {0.0, 0.0, 0.95 * 0.40 + 0.01};  // armed 10 mm beyond the edge
+  const double whole = 0.01 * safety.limits().wall_stiffness;
   double last = 0.0;
-  for (int tick = 0; tick < 2000; ++tick) {
+  int tick = 0;
+  for (; last < whole && tick < 10000; ++tick) {
     const double now = safety.step({}, state, kTick).F_Ho_D.force.norm();
+    EXPECT_LE(now - last, 0.020 + 1e-9) << tick;
     if (tick < 1000) {
-      EXPECT_LE(now - last, 0.020 + 1e-9) << tick;
       EXPECT_LE(now, 3.0 + 1e-9) << tick;
     }
     last = now;
   }
-  EXPECT_GT(last, 19.0);
+  EXPECT_NEAR(last, whole, 1e-9);
+  // from then on it follows the hand as its spring does
+  state.X_DH.translation().z() += 1e-4;
+  EXPECT_NEAR(safety.step({}, state, kTick).F_Ho_D.force.norm(),
+              whole + 1e-4 * safety.limits().wall_stiffness, 1e-9);
+}
+
+//        o  the contact that holds the hand beyond its workspace ends after a gap
+//   _____|_____
+TEST(Safety, TheEndOfTheWorkspaceGrowsSoftlyWhenAContactEndsAfterAGap) {
+  for (const int lifts_off : {1000, 1400, 1500, 2000, 4000}) {
+    Safety safety = settled(kHug, {0.0, 0.0, 7.0});
+    DeviceState state = armed();
+    double last = 7.0;
+    for (int tick = 0; tick < 6000; ++tick) {
+      SafetyRequest request =
+          requestForce({0.0, 0.0, tick < lifts_off ? 7.0 : 0.0}, tick < 300 ? 0.02 + 1e-3 * tick : 0.0);
+      request.restart = tick >= 300 && tick < 310;
+      // it falls 20 mm beyond the edge
+      state.X_DH.translation() = {0.0, 0.0, -0.36 - 4e-4 * std::clamp(tick - 200, 0, 100)};
+      const double now = safety.step(request, state, kTick).F_Ho_D.force.norm();
+      EXPECT_LE(now - last, 0.020 + 1e-9) << tick << ", lifts off at " << lifts_off;
+      last = now;
+    }
+    EXPECT_NEAR(last, 0.02 * safety.limits().wall_stiffness, 1e-6);
+  }
 }
 
 //        o  hand, pressed against the scene: the force goes in a gap, and it falls to the end of its

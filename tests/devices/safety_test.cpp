@@ -80,7 +80,7 @@ TEST(Safety, LimitsTorque) {
   SafetyRequest request;
   request.requested.F_Ho_D.torque = {0.0, 3.0, 0.0};
   DeviceCommand output;
-  for (int tick = 0; tick < 1100; ++tick) output = safety.step(request, armed(), kTick);
+  for (int tick = 0; tick < 2000; ++tick) output = safety.step(request, armed(), kTick);
   EXPECT_NEAR(output.F_Ho_D.torque.y(), 0.4, 1e-12);
   EXPECT_TRUE(safety.acts(SafetyRule::kForceLimited));
 }
@@ -254,6 +254,28 @@ TEST(Safety, AnEmergencyStopIsLatchedUntilReset) {
   EXPECT_TRUE(safety.acts(SafetyRule::kEmergencyStop));
   safety.reset();
   EXPECT_FALSE(safety.step(request, armed(), kTick).brake);
+}
+
+TEST(Safety, ADeviceThatIsNotArmedIsBrakedWithoutAnEmergencyStop) {
+  Safety safety = settled(kSigma, {1.0, 0.0, 0.0});
+  SafetyRequest request = requestForce({1.0, 0.0, 0.0});
+  int begins = 0;
+  for (int i = 0; i < 3; ++i) {
+    request.armed = false;
+    const DeviceCommand command = safety.step(request, armed(), kTick);
+    EXPECT_TRUE(command.brake);
+    EXPECT_EQ(command.F_Ho_D.force, Vector3(Vector3::Zero()));
+    EXPECT_TRUE(safety.acts(SafetyRule::kNotArmed));
+    EXPECT_FALSE(safety.acts(SafetyRule::kEmergencyStop));
+    EXPECT_TRUE(safety.wantsDisarm());
+    request.armed = true;
+    EXPECT_FALSE(safety.step(request, armed(), kTick).brake) << "it is not latched";
+    for (int tick = 0; tick < 600; ++tick) (void)safety.step(request, armed(), kTick);
+    Intervention intervention;
+    while (safety.takeIntervention(intervention))
+      if (intervention.rule == SafetyRule::kNotArmed && intervention.began) ++begins;
+  }
+  EXPECT_EQ(begins, 1) << "a routine rule";
 }
 
 TEST(Safety, OutputsNoForceWhileTheDeadManSwitchIsReleased) {

@@ -62,10 +62,12 @@ class Generate(unittest.TestCase):
     def test_parameters_become_those_of_the_topic_in_their_order_there(self):
         topics = self.topics("//@topic A stream lease_by_topic lease=50ms deadline=10ms", "@final struct A { uint32 id; };",
                              "//@topic B event late_joiner_depth=9 lifespan=5000ms", "@final struct B { uint32 id; };",
-                             "//@topic C state latched of_server", "@final struct C { uint32 id; };")
+                             "//@topic C state latched of_server", "@final struct C { uint32 id; };",
+                             "//@topic D event lifespan=5000ms request", "@final struct D { uint32 id; };")
         self.assertIn("{.deadline = Milliseconds{10}, .lease = Milliseconds{50}, .lease_by_topic = true}", topics)
         self.assertIn("{.lifespan = Milliseconds{5000}, .late_joiner_depth = 9}", topics)
         self.assertIn("{.late_joiner_depth = 1, .latched = true, .of_server = true}", topics)
+        self.assertIn("{.lifespan = Milliseconds{5000}, .request = true}", topics)
 
     def test_enumerators_are_counted(self):
         topics = self.topics("enum Side { LEFT,  // of the trainee, not ours", "  RIGHT };", "@final @nested struct A { Side s; };")
@@ -96,7 +98,7 @@ class Generate(unittest.TestCase):
             (["//@topic A stream lease=1ms lease=2ms", struct], "some.idl:2: 'lease' is there twice: write it once"),
             (["//@topic A stream lose=1ms", struct],
              "some.idl:2: 'lose' is not a parameter: write deadline=10ms, lease=1000ms, lifespan=5000ms, "
-             "late_joiner_depth=1000, reader_depth=16, lease_by_topic, latched or of_server"),
+             "late_joiner_depth=1000, reader_depth=16, lease_by_topic, latched, of_server or request"),
             (["//@topic A stream lease=1ms lease_by_topic=yes", struct],
              "some.idl:2: 'lease_by_topic' has no value: write lease_by_topic"),
             (["//@topic A stream lease_by_topic", struct],
@@ -107,6 +109,8 @@ class Generate(unittest.TestCase):
              "some.idl:2: 'late_joiner_depth' is for events: leave it out (late joiners get the last sample of a state and "
              "none of a stream)"),
             (["//@topic A event latched", struct], "some.idl:2: 'latched' is for states: leave it out, or write A state latched"),
+            (["//@topic A event of_server request", struct],
+             "some.idl:2: 'request' is for events of clients, who wait for the server's answer: leave it out"),
             (["//@topic A stream", "", struct],
              "some.idl:2: no struct on the next line: write //@topic directly above the struct of the topic"),
             ([struct], "some.idl:2: 'A' has no topic: write //@topic A stream above it, or @nested when it is only part of "

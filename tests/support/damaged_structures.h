@@ -14,10 +14,10 @@ namespace tenon::test {
 /// [bytes] The header of a structure file begins with magic, version and byte order, which are tested by
 /// themselves.
 inline constexpr std::size_t kStructureFileStart = 16;
-inline constexpr std::size_t kStructureFileHeader = 504;
+inline constexpr std::size_t kStructureFileHeader = 568;
 /// Where the header lists the first byte of each section, then the number of elements of each.
 inline constexpr std::size_t kSectionsAt = 112;
-inline constexpr std::size_t kSections = 18;
+inline constexpr std::size_t kSections = 22;
 
 /// Sets the size and the checksum that the header of a structure file states to those of `bytes`.
 inline void correctStructureChecksum(std::vector<std::uint8_t>& bytes) {
@@ -34,8 +34,8 @@ inline void correctStructureChecksum(std::vector<std::uint8_t>& bytes) {
 /// Damage number `seed` of a structure file, with a right checksum: in its header, or in one of its sections.
 inline std::vector<std::uint8_t> damagedStructures(const std::vector<std::uint8_t>& whole,
                                                    std::uint64_t seed) {
-  constexpr std::array<std::size_t, kSections> kElementBytes{4, 2, 2, 28, 24, 24, 32, 1,  1,
-                                                             1, 1, 4, 28, 24, 24, 32, 36, 28};
+  constexpr std::array<std::size_t, kSections> kElementBytes{4, 2,  2,  28, 24, 24, 32, 1, 1,  1, 1,
+                                                             4, 28, 24, 24, 32, 36, 28, 4, 72, 4, 16};
   constexpr std::size_t kCountAt = kSectionsAt + 8 * kElementBytes.size();
   const auto number = [&whole](std::size_t at) {
     std::uint64_t value = 0;

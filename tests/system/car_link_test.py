@@ -149,7 +149,7 @@ class CarOverLinksNightly(unittest.TestCase):
         machines = self.machines
         self.server = machines.start(0, "serve", SCENARIO, *network, "--wait-for", "right,left,forearm,head,instructor",
                                     "--journal", machines.out / "journal.mcap")
-        self.server.wait_for("is open", 900)
+        self.server.wait_until_open(900)
         self.recorder = machines.start(0, "record", "-o", machines.out / "session.mcap", "--key", machines.key, *network)
         self.recorder.wait_for("recording", 60)
         # copies of the bay for five hands, beside the server, are more than the two cores of a small machine compute in time

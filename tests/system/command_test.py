@@ -26,6 +26,7 @@ class Commands(unittest.TestCase):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
             self.assert_refused(stage, "waits for people", "pause")
+            self.assert_refused(stage, "waits for people", "release", "right")
             stage.start("trainee", "--seed", 1)
             server.wait_for("run: running", 60)
             self.assert_accepted(stage, "pause")

@@ -32,6 +32,21 @@ RIGHT = "[...tenon.session.hands.values()].find(h => tenon.session.sceneHands.ge
 LEFT = RIGHT.replace("'right'", "'left'")
 
 
+# A standalone headset, whose browser gives the window no frames while it presents; those of the emulated one are let through.
+# `resume`: as after its session
+STANDALONE = """(() => {
+  const { session } = tenon.part.headset;
+  const own = Object.getOwnPropertySymbols(session).map((symbol) => session[symbol]?.onDeviceFrame).find((callback) => callback !== undefined);
+  const { requestAnimationFrame } = window;
+  const waiting = [];
+  window.requestAnimationFrame = (callback) => (callback === own ? requestAnimationFrame(callback) : waiting.push(callback));
+  window.resume = () => {
+    window.requestAnimationFrame = requestAnimationFrame;
+    waiting.splice(0).forEach((callback) => requestAnimationFrame(callback));
+  };
+})()"""
+
+
 def until(browser, act, is_so):
     """Does something again and again until it has come to this."""
     for _ in range(60):
@@ -123,6 +138,38 @@ class Headset(unittest.TestCase, Worn):
                 browser("await", expression="!tenon.part.hand.isOn && tenon.session.standing.length > 0")
                 browser("value", expression="tenon.part.headset.end()")
                 browser("await", expression="tenon.part.headset === undefined && tenon.part.hand.isWatched === undefined")
+                self.assertEqual(browser.problems, [])
+
+
+    def test_the_scene_goes_on_in_a_headset_whose_browser_gives_the_window_no_frames(self):
+        with Stage(lockstep=False) as stage:
+            authority, pair = certificates(stage.out)
+            with Browser(HOME=trusting_home(stage.out, authority)) as browser:
+                self.begin(stage, browser, without_timeouts(SCENARIO, stage.out), pair, "right")
+                browser("value", expression="""(() => {
+                  window.updates = 0;
+                  const { update } = tenon.view;
+                  tenon.view.update = (...values) => (++updates, update.apply(tenon.view, values));
+                })()""")
+                # once for each picture, not for each frame of the window as well
+                until(browser, """(async () => {
+                  await pictures(1);
+                  const before = [updates, tenon.view.pictures];
+                  await pictures(10);
+                  window.counted = [updates - before[0], tenon.view.pictures - before[1]];
+                })()""", "counted[1] >= 9 && counted[0] === counted[1]")
+                browser("value", expression=STANDALONE)
+                browser("value", expression="headset.controllers.right.updateButtonValue('squeeze', 1)")
+                browser("await", expression="tenon.part.headset.grasps.size === 1")
+                drawn = "tenon.view.positionOf(tenon.session.objects.get(tenon.part.hand.now.objectId).name)[2]"
+                browser("value", expression=f"window.first = {drawn}")
+                until(browser, "go(headset.controllers.right, 0, 0.04, 0)", f"{drawn} > first + 0.03")
+                browser("value", expression="headset.controllers.right.updateButtonValue('squeeze', 0)")
+                # after it the window's frames are the page's again
+                browser("value", expression="tenon.part.headset.end(), resume()")
+                browser("await", expression="tenon.part.headset === undefined")
+                browser("value", expression="window.updates = 0")
+                browser("await", expression="updates > 5")
                 self.assertEqual(browser.problems, [])
 
 

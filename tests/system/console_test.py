@@ -56,9 +56,9 @@ def memory(process):
 
 
 def recorded(test, stage):
-    """The recording of a whole session."""
+    """The recording of a whole session; its journal is beside it."""
     recording = stage.out / "session.mcap"
-    server = stage.serve(SCENARIO, "--wait-for", "right,recorder")
+    server = stage.serve(SCENARIO, "--wait-for", "right,recorder", "--journal", stage.out / "journal.mcap")
     recorder = stage.start("record", "-o", recording)
     stage.start("trainee", "--seed", 1)
     test.assertEqual((server.wait(), recorder.wait()), (0, 0), server.text())
@@ -225,8 +225,33 @@ def pass_of(console):
     return re.search(r"#pass=(\w+)$", console.wait_for("#pass="))[1]
 
 
+def with_signals(stage):
+    """A copy of the scenario `stacking` whose first two steps wait for signals, without a time limit."""
+    folder = stage.out / "stacking"
+    shutil.copytree(SOURCE / "scenarios" / "stacking", folder)
+    waits = "".join(f"\n  - name: {name}\n    title: {{en: Wait, de: Warten}}\n    conditions: {{signal: {signal}}}\n" for name, signal in (("rung", "bell"), ("closed", "gripper_closed")))
+    scenario = folder / "scenario.yaml"
+    scenario.write_text(scenario.read_text(encoding="utf-8").replace("\nstates:\n", f"\nstates:{waits}\n"), encoding="utf-8")
+    return folder
+
+
 class Desk(unittest.TestCase):
     """What a page asks of the desk, asked by a program."""
+
+    def test_a_viewer_is_told_the_signals_and_the_titles_of_the_scenario(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve(with_signals(stage), "--wait-for", "observer")
+            _, port = start_console(stage)
+            server.wait_for("run: running")
+            told = {}
+            with Viewer(port) as viewer:
+                viewer.begin("SceneSignal", "SceneTitle")
+                for topic, payload in viewer.messages():
+                    told.setdefault(topic, []).append(bytes(payload))
+                    if sum(map(len, told.values())) == 3:
+                        break
+            self.assertEqual([name in message for name, message in zip((b"bell\0", b"gripper_closed\0"), sorted(told["SceneSignal"], key=lambda message: message[4]))], [True, True])
+            self.assertTrue(all(title.encode() in told["SceneTitle"][0] for title in ("Three blocks", "Drei Klötze")))
 
     def test_rights_come_from_the_key_and_the_server_answers(self):
         with Stage(lockstep=False) as stage:
@@ -325,9 +350,9 @@ class Desk(unittest.TestCase):
                 viewer.begin("/console")
                 states = (json.loads(payload)["state"] for _, payload in viewer.messages())
                 self.assertIn("joined", states)
-            with self.assertRaises(Refused) as refused:
-                Viewer(port, path="/live/other")
-            self.assertEqual(refused.exception.status, 404)
+            with Viewer(port, path="/live/other") as viewer, self.assertRaises(Closed) as closed:
+                viewer.receive()
+            self.assertRegex(str(closed.exception), "^there is no such session")
 
 
 @contextlib.contextmanager
@@ -504,7 +529,7 @@ class Page(unittest.TestCase):
 
             console.signal(signal.SIGKILL)
             console.wait()
-            browser("await", expression="document.querySelector('.top .badge').textContent === 'Verbinde neu'")
+            browser("await", expression="document.querySelector('.top .badge').textContent === 'Getrennt'")
             browser.problems.clear()  # the browser reports the connection that was refused
             start_console(stage, port)
             # a fast machine may be through the session by now: then the gateway searches for the next one
@@ -517,7 +542,7 @@ class Page(unittest.TestCase):
                 browser("picture", file=f"{pictures}/{SCENARIO}.png")
             self.assertEqual(browser.problems, [])
 
-    def test_a_page_that_makes_room_for_newer_ones_says_so(self):
+    def test_a_page_that_makes_room_for_newer_ones_says_so_nightly(self):
         with Stage() as stage, Browser() as browser:
             _, port = start_console(stage)
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
@@ -589,11 +614,31 @@ class Page(unittest.TestCase):
             server.wait_for("step skipped")
             self.assertEqual(browser.problems, [])
 
+    def test_all_signals_and_the_title_of_a_scenario_are_told_and_a_session_elsewhere_is_said_to_be_so(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve(with_signals(stage), "--wait-for", "observer")
+            console, port = start_console(stage, 0, "--role", "instructor")
+            server.wait_for("run: running")
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light", language="de-DE")
+            browser("await", expression="document.querySelector('.desk')?.hidden === false && document.querySelector('.title').textContent === 'Drei Klötze'")
+            # one that the step waits for comes first, and says so
+            select = "document.querySelector('.desk .rows select[aria-label=Signal]')"
+            options = f"[...{select}.options].map(option => option.textContent).join()"
+            browser("await", expression=f"{options} === 'bell (erwartet),gripper closed'")
+            browser("value", expression=f"{select}.value = 'bell', document.querySelector('.desk .rows [data-command=signal]').click()")
+            browser("await", expression="[...document.querySelectorAll('.notice.good')].some(n => n.textContent === 'Signal senden: angenommen')")
+            browser("await", expression=f"tenon.session.step.name === 'closed' && {options} === 'gripper closed (erwartet),bell'")
+            browser("open", url=f"http://localhost:{port}/?session=monday", width=1280, height=800, theme="light")
+            browser("await", expression="document.querySelector('.cover').dataset.state === 'elsewhere' && document.querySelector('.cover').textContent.includes('This console shows test, and nothing else')")
+            browser("value", expression="document.querySelector('.cover a').click()")
+            browser("await", expression="document.querySelector('.top .badge').textContent === 'Live' && document.querySelector('.title').textContent === 'Three blocks'")
+            self.assertEqual(browser.problems, [])
+
     def test_a_stop_is_unconfirmed_while_the_gateway_hangs(self):
         with Stage(lockstep=False) as stage, Browser() as browser:
             server, console, port = at_work(stage)
-            for language, unconfirmed, confirmed in (("en-GB", "Stop not confirmed. Use the switch at the device", "Stop forces: confirmed"),
-                                                     ("de-DE", "Halt nicht bestätigt. Nimm den Schalter am Gerät", "Kräfte stoppen: bestätigt")):
+            for language, unconfirmed, confirmed in (("en-GB", "Stop not confirmed. Use the emergency stop switch at the device", "Emergency stop: confirmed"),
+                                                     ("de-DE", "Halt nicht bestätigt. Benutze den Not-Halt-Schalter am Gerät", "Not-Halt: bestätigt")):
                 browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light", language=language)
                 browser("await", expression="document.querySelector('.top .badge').textContent === 'Live' && tenon.session.run !== undefined")
                 says = f"document.querySelector('.alarm[role=alert]').textContent.startsWith({json.dumps(unconfirmed)}) && document.querySelector('.alarm').offsetHeight > 0"
@@ -605,6 +650,126 @@ class Page(unittest.TestCase):
                 browser("await", expression=f"!document.body.classList.contains('unconfirmed') && [...document.querySelectorAll('.notice.good')].some(n => n.textContent === {json.dumps(confirmed)})")
                 browser("await", expression="document.querySelector('.strip').classList.contains('raised')")
             server.wait_for("pressed in the browser")
+            self.assertEqual(browser.problems, [])
+
+    def test_nothing_is_claimed_of_the_stop_while_nothing_is_heard(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server, console, port = at_work(stage)
+            strip, badge = "document.querySelector('.strip-text')", "document.querySelector('.top .badge').textContent"
+            live, raised = f"{badge} === 'Live'", "document.querySelector('.strip').classList.contains('raised')"
+            # also on a phone, where the strip says nothing while nothing is wrong
+            unknown = f"{strip}.textContent.startsWith('Not known whether forces are stopped') && {strip}.offsetHeight > 0 && !({raised})"
+            none = f"{strip}.textContent === 'No emergency stop active'"
+            known = f"{strip}.textContent.includes('Last known: Emergency stop by')"
+            browser("open", url=f"http://localhost:{port}/", width=390, height=844, theme="light")
+            browser("await", expression=f"{live} && {none}")
+            # a connection that is open and silent is given up
+            console.signal(signal.SIGSTOP)
+            browser("await", expression=f"{badge} === 'No data' && {unknown}")
+            browser("await", expression=f"{badge} === 'Reconnecting' && {unknown}")
+            console.signal(signal.SIGCONT)
+            browser("await", expression=f"{live} && {none}")
+            browser("key", key="Space")
+            browser("await", expression=f"{raised} && [...document.querySelectorAll('.notice')].some(n => n.textContent === 'Emergency stop: confirmed')")
+            console.signal(signal.SIGKILL)
+            console.wait()
+            browser("await", expression=f"{badge} === 'Reconnecting' && {unknown} && {known} && document.querySelector('.stop span').textContent === 'Emergency stop'")
+            start_console(stage, port)
+            browser("await", expression=f"{live} && {raised} && !({known})")
+            browser.problems.clear()  # the browser reports the connections that were refused
+            server.signal(signal.SIGKILL)
+            browser("await", expression=f"document.querySelector('.cover').dataset.state === 'lost' && {unknown} && {known}")
+            self.assertEqual(browser.problems, [])
+
+    def test_a_hand_that_is_lost_with_the_gateway_is_offered_again(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve(without_timeouts(SCENARIO, stage.out), "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
+            browser("await", expression="tenon.view.models >= 3 && document.querySelector('.take')?.hidden === false")
+            browser("sit down")
+            server.wait_for("armed by the person at the station|run: running")
+            # a short hang costs nothing: what the page would have sent meanwhile is not held against it
+            console.signal(signal.SIGSTOP)
+            time.sleep(3)  # shorter than a gateway that is given up
+            console.signal(signal.SIGCONT)
+            browser("await", expression="document.querySelector('.top .badge').textContent === 'Live' && tenon.part.hand !== undefined")
+            console.signal(signal.SIGKILL)
+            console.wait()
+            offer = "document.querySelector('.notice[data-offer=\"hand\"]')"
+            browser("await", expression=f"{offer}?.textContent.startsWith('You no longer move a hand: the connection to the gateway was lost')")
+            browser.problems.clear()  # the browser reports the connections that were refused
+            start_console(stage, port)
+            browser("await", expression=f"{offer}.querySelector('button').hidden === false && tenon.part.hand === undefined")
+
+    def test_a_session_that_is_not_running_is_named_and_looked_for_nightly(self):
+        with Stage() as stage, Browser() as browser:
+            _, port = start_console(stage, shown=[])
+            browser("open", url=f"http://localhost:{port}/?session=test", width=1280, height=800, theme="dark")
+            browser("await", expression="document.querySelector('.cover h2')?.textContent === 'Session test is not running'")
+            self.assertEqual(browser("value", expression="[document.querySelector('.cover a').getAttribute('href'), document.querySelector('.cover a').textContent]"), ["/", "All sessions"])
+            stage.serve(SCENARIO, "--wait-for", "right")
+            browser("await", expression="document.title === 'Peg and box – Tenon' && document.querySelector('.cover').hidden")
+            self.assertEqual(browser.problems, [])
+
+    def test_a_file_that_is_dropped_by_mistake_ends_no_session_nightly(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            _, console, port = at_work(stage, "--role", "instructor")
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light")
+            browser("await", expression="document.querySelector('.desk')?.hidden === false")
+            drop = "(data => { data.items.add(new File(['x'], '%s')); dispatchEvent(new DragEvent('drop', { dataTransfer: data })); })(new DataTransfer())"
+            browser("value", expression=drop % "me.png")
+            browser("await", expression="[...document.querySelectorAll('.notice.bad')].some(n => n.textContent.startsWith('me.png is no recording'))")
+            browser("value", expression=drop % "monday.mcap")
+            browser("await", expression="document.querySelector('dialog[open] h2')?.textContent === 'Leave the session?'")
+            browser("key", key="Escape")
+            browser("await", expression="document.querySelector('dialog[open]') === null")
+            self.assertTrue(browser("value", expression="!document.querySelector('.desk').hidden && document.querySelector('.stop') !== null && tenon.player === undefined"))
+            browser("value", expression=drop % "monday.mcap")
+            browser("await", expression="document.querySelector('dialog[open] .primary') !== null")
+            browser("value", expression="document.querySelector('dialog[open] .primary').click()")
+            browser("await", expression="document.querySelector('.cover').dataset.state === 'file' && document.querySelector('.desk') === null")
+            self.assertEqual(browser.problems, [])
+
+    def test_where_site_data_is_blocked_there_is_a_stop_and_a_seat_nightly(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server, console, port = at_work(stage, "--role", "instructor")
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light", blocked=True)
+            browser("await", expression="document.querySelector('.desk')?.hidden === false")
+            browser("value", expression="document.querySelector('.stop').click()")
+            server.wait_for("^engaged by somebody at the console: pressed in the browser|^engaged by console: pressed in the browser")
+            browser("await", expression="document.querySelector('.strip').classList.contains('raised')")
+            self.assertEqual(browser.problems, [])
+
+    def test_who_has_left_the_seat_does_not_get_it_again_by_a_reload_nightly(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            _, console, port = at_work(stage, "--role", "instructor")
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light")
+            seated = "document.querySelector('.desk')?.hidden === false"
+            browser("await", expression=seated)
+            browser("value", expression="location.reload()")
+            browser("await", expression=f"{seated} && performance.getEntriesByType('navigation')[0].type === 'reload'")
+            browser("value", expression="document.querySelector('.sit').click()")
+            browser("await", expression="document.querySelector('.desk').hidden && sessionStorage.getItem('role') === null")
+            browser("value", expression="window.isOld = true, location.reload()")
+            browser("await", expression="window.isOld === undefined && document.querySelector('.top .badge').textContent === 'Live' && tenon.session.people.size > 0")
+            self.assertTrue(browser("value", expression=f"!({seated}) && sessionStorage.getItem('role') === null"))
+            self.assertEqual(browser.problems, [])
+
+    def test_a_trainees_pass_does_not_hide_the_key_of_an_instructors_hand_nightly(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            _, console, port = at_work(stage, "--role", "trainee")
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light")
+            browser("await", expression="document.querySelector('.take')?.hidden === false && tenon.session.sceneHands.size > 1")
+            browser("value", expression="document.querySelector('.take').click()")
+            browser("await", expression="document.querySelector('dialog[open] select') !== null")
+            shown = "document.querySelector('dialog[open] input[type=password]').offsetHeight > 0"
+            self.assertFalse(browser("value", expression=shown), "nobody elsewhere reaches this gateway")
+            browser("value", expression="(s => { s.value = 'instructor'; s.dispatchEvent(new Event('change')); })(document.querySelector('dialog[open] select'))")
+            self.assertTrue(browser("value", expression=shown))
+            name = "document.getElementById(document.querySelector('dialog[open]').getAttribute('aria-labelledby')).textContent"
+            self.assertEqual(browser("value", expression=name), browser("value", expression="document.querySelector('dialog[open] h2').textContent"))
             self.assertEqual(browser.problems, [])
 
     def test_a_stop_that_was_pressed_without_a_gateway_reaches_the_session_with_the_next_one(self):
@@ -641,7 +806,7 @@ class Page(unittest.TestCase):
             server.wait_for("^engaged by console: pressed in the browser")
             server.wait_for("^run: emergency stop")
             browser("await", expression=f"!{unconfirmed} && document.querySelector('.strip').classList.contains('raised')")
-            browser("await", expression="[...document.querySelectorAll('.notice.good')].some(n => n.textContent === 'Stop forces: confirmed')")
+            browser("await", expression="[...document.querySelectorAll('.notice.good')].some(n => n.textContent === 'Emergency stop: confirmed')")
             server.signal(signal.SIGTERM)
 
     def test_a_seat_that_the_server_has_ended_is_shown_as_lost(self):
@@ -654,10 +819,10 @@ class Page(unittest.TestCase):
                 desk.begin("/console")
                 self.assertTrue(desk.ask("deskSit", role="instructor", name="Bob", key=pass_of(console))["accepted"])
                 self.assertTrue(desk.ask("deskCommand", words=["kick", str(client)])["accepted"])
-                browser("await", expression="document.querySelector('[data-offer=seat]')?.textContent.startsWith('Your seat is lost: Bob has removed you')")
-                self.assertTrue(browser("value", expression="document.querySelector('.desk').hidden && document.querySelector('.sit').textContent === 'Take a seat'"))
+                browser("await", expression="document.querySelector('[data-offer=seat]')?.textContent.startsWith('Your role has been withdrawn: Bob has removed you')")
+                self.assertTrue(browser("value", expression="document.querySelector('.desk').hidden && document.querySelector('.sit').textContent === 'Take a role'"))
                 browser("value", expression="document.querySelector('[data-offer=seat] button').click()")
-                browser("await", expression="document.querySelector('dialog[open] h2')?.textContent === 'Take a seat in this session'")
+                browser("await", expression="document.querySelector('dialog[open] h2')?.textContent === 'Take a role in this session'")
             self.assertEqual(browser.problems, [])
 
     def test_a_mouse_mounts_the_first_part_and_the_session_resimulates(self):
@@ -670,7 +835,15 @@ class Page(unittest.TestCase):
             console.wait_for("joined session 'test'")
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
             browser("await", expression="tenon.view.models >= 3 && !document.querySelector('.take').hidden")
-            browser("sit down")
+            browser("value", expression="document.querySelector('.take').click(), document.querySelector('dialog[open] .primary').click()")
+            browser("await", expression="document.querySelector('.lesson').offsetHeight > 0 && document.querySelector('.arm').offsetHeight > 0")
+            browser("value", expression="document.querySelector('.lesson .primary').click()")
+            # Enter is for what has the focus; only from the scene it switches the hand on
+            browser("value", expression="(a => { a.href = '#'; document.body.append(a); a.textContent = 'elsewhere'; a.focus(); })(document.createElement('a'))")
+            browser("key", key="Enter")
+            self.assertEqual(browser("value", expression="tenon.part.hand.armUntil"), 0)
+            browser("value", expression="tenon.view.canvas.focus()")
+            browser("key", key="Enter")
             browser("await", expression="tenon.part.hand.isOn")
             height = "[...tenon.session.hands.values()][0].X_WH.p[2]"
             browser("value", expression=f"window.first = {height}")
@@ -683,6 +856,14 @@ class Page(unittest.TestCase):
             browser("await", expression=f"{height} < window.first - 0.02")
             browser("value", expression="navigator.getGamepads = () => []")
             # help with the depth
+            browser("key", key="d")
+            browser("await", expression="Math.abs(tenon.part.hand.guide?.farther ?? 1) < 0.003 && !tenon.part.hand.isDeepening")
+            # a button that is held by its key
+            browser("value", expression="document.querySelector('.hand-tools button').focus()")
+            browser("key down", key="Enter")
+            browser("await", expression="Math.abs(tenon.part.hand.guide?.farther ?? 0) > 0.02")
+            browser("key up", key="Enter")
+            browser("value", expression="document.activeElement.blur()")
             browser("key", key="d")
             browser("await", expression="Math.abs(tenon.part.hand.guide?.farther ?? 1) < 0.003 && !tenon.part.hand.isDeepening")
             # a button that is held, and the release of which is not heard of
@@ -712,6 +893,11 @@ class Page(unittest.TestCase):
             browser("value", expression=f"window.first = {height}")
             browser("touch", **{"from": [box[0], box[1] + 20], "to": [box[0], box[1] - 30]})
             browser("await", expression=f"{height} > window.first + 0.005")
+            # a second finger: the two turn the view, and the hand stays
+            browser("value", expression="window.before = [tenon.part.hand.targets[0].p.clone(), tenon.view.axes().away]")
+            browser("touch", **{"from": box, "beside": [box[0] + 60, box[1]], "to": [box[0], box[1] + 60]})
+            browser("await", expression="tenon.view.axes().away.angleTo(before[1]) > 0.05")
+            self.assertLess(browser("value", expression="tenon.part.hand.targets[0].p.distanceTo(before[0])"), 0.002)
             # sticks as somebody moves them who follows the line of the way
             browser("value", expression="""(() => {
               window.felt = [];
@@ -729,7 +915,7 @@ class Page(unittest.TestCase):
             browser("await", expression="tenon.session.step.name === 'insert_peg'")
             self.assertEqual(browser.problems, [])
 
-    def test_no_serious_fault_of_accessibility(self):
+    def test_no_serious_fault_of_accessibility_nightly(self):
         with Stage(lockstep=False) as stage, Browser() as browser:
             server = stage.serve("stacking", "--wait-for", "right")
             _, lobby = start_console(stage, shown=[])
@@ -759,7 +945,7 @@ class Page(unittest.TestCase):
                     self.assertEqual(browser("axe"), [], "the request for a seat")
             self.assertEqual(browser.problems, [])
 
-    def test_a_recording_shows_its_parts_where_there_are_no_assets_and_in_public_viewers(self):
+    def test_a_recording_shows_its_parts_where_there_are_no_assets_and_in_public_viewers_nightly(self):
         with Stage() as stage, Browser() as browser:
             recording = recorded(self, stage)
             _, port = start_console(stage, 0, "--cache", stage.out / "empty", shown=[recording])
@@ -823,6 +1009,7 @@ class Page(unittest.TestCase):
             browser("key", key="Space")
             browser("await", expression=f"tenon.player.time > {0.2 * end + 0.5}")
             self.look(browser)
+            self.beside(browser)
             # what cannot be read is said, and the next place can be
             fail_once = "((r, name) => { r[name] = () => { delete r[name]; return Promise.reject(new Error('the disk is gone')); }; })(tenon.player.recording, 'NAME')"
             is_said = "!document.querySelector('.cover').hidden && document.querySelector('.cover').textContent.includes('the disk is gone')"
@@ -849,15 +1036,16 @@ class Page(unittest.TestCase):
             self.assertEqual(browser.problems, [])
             self.elsewhere(stage, browser, recording)
 
-            # a file that is none, by its address
+            # files that are none, by their address
             cut = stage.out / "cut.mcap"
             cut.write_bytes(recording.read_bytes()[:100_000])
             with files_elsewhere(stage.out) as files:
                 _, port = start_console(stage, 0, "--recordings-from", files, shown=[])
-                browser("open", url=f"http://localhost:{port}/?file={urllib.parse.quote(f'{files}/open/cut.mcap', safe='')}", width=1280, height=800, theme="dark")
-                browser("await", expression="document.querySelector('.cover').textContent.includes('It has no index')")
+                for name, reason in (("cut", "It has no index"), ("journal", "It is the journal of a server")):
+                    browser("open", url=f"http://localhost:{port}/?file={urllib.parse.quote(f'{files}/open/{name}.mcap', safe='')}", width=1280, height=800, theme="dark")
+                    browser("await", expression=f"document.querySelector('.cover').textContent.includes('{reason}')")
 
-    def test_a_file_that_cannot_be_played_is_named_at_the_start(self):
+    def test_a_file_that_cannot_be_played_is_named_at_the_start_nightly(self):
         with Stage() as stage:
             journal, recording, foreign = (stage.out / name for name in ("journal.mcap", "session.mcap", "foreign.mcap"))
             server = stage.serve(SCENARIO, "--wait-for", "right,recorder", "--journal", journal)
@@ -902,6 +1090,73 @@ class Page(unittest.TestCase):
         self.assertIn("is no server's origin", refused.stderr)
         browser.problems.clear()  # the browser reports what it was asked elsewhere, and what it refused
 
+    def beside(self, browser):
+        """The same recording beside itself, and back to where this one was."""
+        browser("value", expression="tenon.player.isPlaying && tenon.player.toggle()")
+        time = browser("value", expression="tenon.player.time")
+        choose = """fetch('/recording.mcap').then(answer => answer.blob()).then(bytes => {
+          const [input, data] = [document.querySelector('.player input[type=file]'), new DataTransfer()];
+          data.items.add(new File([bytes], 'second.mcap'));
+          input.files = data.files;
+          input.dispatchEvent(new Event('change'));
+        })"""
+        browser("value", expression=choose)
+        players = "[...document.querySelectorAll('iframe')].map(frame => frame.contentWindow.tenon?.player)"
+        browser("await", expression=f"{players}.length === 2 && {players}.every(player => player !== undefined && !player.isReading)")
+        browser("value", expression=f"{players}[0].seek(1), {players}[0].toggle()")
+        browser("await", expression=f"{players}.every(player => player.isPlaying && player.time > 1.5)")
+        self.assertLess(browser("value", expression=f"(([a, b]) => Math.abs(a.time - b.time))({players})"), 1)
+        browser("value", expression="document.querySelector('.beside .close').click()")
+        browser("await", expression=f"document.querySelector('iframe') === null && Math.abs(tenon.player.time - {time}) < 0.01 && document.querySelector('.player') !== null")
+        browser("value", expression=f"tenon.player.seek({time} - 1)")
+        browser("await", expression=f"!tenon.player.isReading && Math.abs(tenon.player.recording.secondsOf(tenon.session.tick) - {time} + 1) < 0.2")
+        browser("value", expression="tenon.player.toggle()")
+        browser("await", expression=f"tenon.player.time > {time}")
+
+    def parts_by_keys(self, browser):
+        """Parts are listed, picked, hidden, shown alone, followed and measured without a pointer, and it is said."""
+        active = "document.getElementById(document.activeElement.getAttribute('aria-activedescendant') ?? '')"
+        hidden = "[...tenon.view.parts.hidden].map(id => tenon.session.objects.get(id).name)"
+        said = "document.querySelector('.tools .unseen[role=status]').textContent"
+        browser("key", key="p")
+        browser("await", expression="document.activeElement.getAttribute('role') === 'listbox'")
+        for key, name in (("Home", "Box"), ("ArrowDown", "Peg"), ("ArrowDown", "Peg"), ("ArrowUp", "Box"), ("End", "Peg")):
+            browser("key", key=key)
+            browser("await", expression=f"{active}?.querySelector('.name').textContent === '{name}' && {active}.ariaSelected === 'true' && document.querySelector('.toolrow b').textContent === '{name}'")
+        browser("key", key="o")
+        self.assertEqual(browser("value", expression=f"[{hidden}, {said}]"), [["peg"], "Peg is hidden"])
+        browser("await", expression=f"{active}.textContent.includes('hidden')")
+        browser("key", key="o")
+        self.assertEqual(browser("value", expression=f"[{hidden}, {said}]"), [[], "Peg is shown"])
+        browser("key", key="i")
+        self.assertEqual(browser("value", expression="[...tenon.view.parts.all.values()].filter(p => p.group.visible).map(p => p.object.name)"), ["peg"])
+        browser("key", key="a")
+        self.assertEqual(browser("value", expression=f"[{hidden}, {said}]"), [[], "All parts are shown"])
+        browser("key", key="v")
+        browser("await", expression=f"document.querySelector('.toolrow [data-key=chase]').ariaPressed === 'true' && {said} === 'The view follows Peg'")
+        # the distance of two parts says of what it is
+        browser("key", key="b")
+        browser("key", key="Enter")
+        browser("key", key="Home")
+        browser("key", key="Enter")
+        measured = "document.querySelector('.toolrow[role=status]').textContent"
+        browser("await", expression=f"/^[0-9.]+ mmPeg – Box: (nearest points of their drawn surfaces|their drawn surfaces meet)along x .* mm; centres of their boxes [0-9.]+ mm apart$/.test({measured})")
+        browser("await", expression=f"{measured}.startsWith(document.querySelector('.label.measured')?.textContent ?? 'none')")
+        browser("key", key="b")
+        browser("key", key="Escape")
+        browser("await", expression="document.activeElement.tagName === 'CANVAS' && document.querySelector('.partlist').hidden")
+        browser("key", key="1")
+        # all keys are in a dialog
+        browser("key", key="?")
+        browser("await", expression="document.querySelector('dialog[open] h2')?.textContent === 'Keys' && document.querySelectorAll('dialog[open] kbd').length > 20")
+        browser("key", key="Escape")
+        browser("await", expression="document.querySelector('dialog[open]') === null")
+        # the cursor of the plots
+        browser("value", expression="document.querySelector('.panel-plots .body').focus()")
+        browser("key", key="ArrowLeft")
+        browser("await", expression="[...document.querySelectorAll('.chart:not(.none) .u-cursor-x')].every(line => !line.classList.contains('u-off'))")
+        browser("value", expression="document.activeElement.blur()")
+
     def look(self, browser):
         """Section, hiding, measuring and the choice of plots, by clicks and keys."""
         # where an object is, and still is 12 pixels beside
@@ -933,6 +1188,15 @@ class Page(unittest.TestCase):
         for plot in ("gap", "compute", "age"):
             browser("value", expression=f"document.querySelector('[data-plot={plot}]').click()")
         browser("await", expression="document.querySelectorAll('.chart:not(.none) canvas').length >= 3")
+        self.parts_by_keys(browser)
+        # zoom and turn by keys
+        off = "tenon.view.camera.position.clone().sub(tenon.view.controls.target)"
+        browser("value", expression=f"window.before = {off}")
+        browser("key", key="-")
+        browser("await", expression=f"{off}.length() > 1.05 * before.length()")
+        browser("key", key="+")
+        browser("key", key="e")
+        browser("await", expression=f"Math.abs({off}.length() / before.length() - 1) < 0.01 && {off}.angleTo(before) > 0.02 && Math.abs({off}.z - before.z) < 0.01")
 
     def test_the_lobby_leads_to_a_session(self):
         with Stage() as stage, Browser() as browser:
@@ -947,6 +1211,54 @@ class Page(unittest.TestCase):
             browser("await", expression="location.search === '?session=test' && window.tenon !== undefined && document.title === 'Peg and box – Tenon'")
             browser("await", expression="document.querySelector('.card .step-title')?.textContent === 'Peg and box' && tenon.view.models >= 3 && tenon.view.pictures > 0")
             self.assertTrue(browser("value", expression="tenon.session.isWaiting && [...tenon.view.parts.all.values()].some(part => part.object.name === 'peg' && part.group.visible)"))
+            self.assertEqual(browser.problems, [])
+
+
+@unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")
+class Screen(unittest.TestCase):
+    def test_on_a_wall_a_pixel_of_the_mouse_and_of_the_picture_is_one_of_the_screen(self):
+        with Stage() as stage, Browser() as browser:
+            _, port = start_console(stage)
+            for size, zoom in (((1280, 800), 1), ((2560, 1440), 1.25), ((3840, 2160), 1.75)):
+                with self.subTest(size=size):
+                    browser("open", url=f"http://localhost:{port}/", width=size[0], height=size[1], theme="dark")
+                    browser("await", expression="window.tenon?.view !== undefined")
+                    self.assertEqual(browser("value", expression="Number(getComputedStyle(document.getElementById('app')).zoom)"), zoom)
+                    moved, resolution = browser("value", expression="""(() => {
+                      const { view } = tenon;
+                      const from = view.controls.target.clone();
+                      const to = from.clone().addScaledVector(view.axes().right, 100 * view.metresPerPixel(from));
+                      return [view.project(to).x - view.project(from).x, view.canvas.width / view.canvas.getBoundingClientRect().width / view.pace.quality.ratio];
+                    })()""")
+                    self.assertAlmostEqual(moved, 100, delta=0.5)
+                    self.assertAlmostEqual(resolution, 1, delta=0.01)
+            self.assertEqual(browser.problems, [])
+
+    def test_on_a_phone_the_stop_the_view_and_the_lists_are_within_reach_nightly(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            stage.serve(SCENARIO, "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            for size in ((390, 844), (844, 390), (667, 375)):
+                with self.subTest(size=size):
+                    browser("open", url=f"http://localhost:{port}/", width=size[0], height=size[1], theme="light", touch=True)
+                    browser("await", expression="window.tenon?.view?.models >= 3 && document.querySelector('.step-title') !== null")
+                    for stage_of in ("looks on", "takes part"):
+                        if stage_of == "takes part":
+                            browser("sit down")
+                            browser("await", expression="tenon.part.hand.isOn")
+                        covered = browser("value", expression="""['.stop', '.tool:nth-child(1)', '.tool:nth-child(2)', '.step-title'].filter((name) => {
+                          const element = document.querySelector(name);
+                          const { left, top, width, height } = element.getBoundingClientRect();
+                          return !element.contains(document.elementFromPoint(left + width / 2, top + height / 2));
+                        })""")
+                        self.assertEqual(covered, [], stage_of)
+                    browser("value", expression="document.querySelector('.take').click()")
+                    browser("await", expression="tenon.part.hand === undefined")
+            browser("open", url=f"http://localhost:{port}/", width=390, height=844, theme="light", touch=True)
+            browser("await", expression="window.tenon?.view?.models >= 3 && document.querySelector('.events li') !== null")
+            browser("value", expression="[...document.querySelectorAll('.tabs button')].at(-1).click()")
+            browser("await", expression="document.querySelector('.events li').offsetHeight > 0 && document.querySelector('.steps').offsetHeight === 0")
             self.assertEqual(browser.problems, [])
 
 

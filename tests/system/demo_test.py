@@ -1,6 +1,7 @@
 """`tenon demo`: its lockstep recordings are complete, its reports repeatable, and it leaves no program running."""
 import argparse
 import contextlib
+import io
 import json
 import os
 import re
@@ -16,7 +17,7 @@ from pathlib import Path
 from stage import COARSE, PROGRAMS, SOURCE, TENON, final_hash, free_domain, tenon
 
 sys.path.insert(0, str(SOURCE / "deploy"))
-from demo import output_folder  # noqa: E402
+from demo import Program, has_opened, output_folder  # noqa: E402
 from viewer import Viewer  # noqa: E402
 from demo_scene import hands_of  # noqa: E402
 
@@ -247,6 +248,23 @@ class Endings(DemoCase):
         self.assert_nothing_runs()
 
 
+class Opening(unittest.TestCase):
+    def test_a_warning_of_the_bake_is_not_taken_for_the_session_and_is_shown(self):
+        warning = "Engine bay: 26 % of the surface is of walls thinner than a voxel (2 mm), up to 1.3 mm thicker on each side; 0 % is open"
+        with tempfile.TemporaryDirectory() as folder:
+            server = object.__new__(Program)
+            server.log, server.read_until = Path(folder) / "serve.log", 0
+            server.log.write_text(f"{warning}\n", encoding="utf-8")
+            said = io.StringIO()
+            with contextlib.redirect_stdout(said):
+                self.assertFalse(has_opened(server))
+            self.assertEqual(said.getvalue(), f"{warning}\n")
+            for line in ("session 'demo' is open, waiting for people", "session 'demo' is open again after tick 12000", "session 'demo' is open again, waiting for people"):
+                with server.log.open("a", encoding="utf-8") as log:
+                    log.write(f"{line}\n")
+                self.assertTrue(has_opened(server), line)
+
+
 class Folder(unittest.TestCase):
     def test_a_second_demo_goes_into_a_folder_of_its_own(self):
         with tempfile.TemporaryDirectory(prefix="tenon-demo-") as folder, contextlib.chdir(folder):
@@ -289,7 +307,7 @@ class RealTime(DemoCase):
 
 
 class Instructor(DemoCase):
-    def test_a_scenario_without_a_hand_for_one_starts_none(self):
+    def test_a_scenario_without_a_hand_for_one_starts_none_nightly(self):
         scenario = self.folder / "alone" / "scenario.yaml"
         scenario.parent.mkdir()
         text = (PEG_AND_BOX / "scenario.yaml").read_text(encoding="utf-8")

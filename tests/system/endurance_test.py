@@ -88,7 +88,7 @@ class LongSession:
                              "\n".join(f"== {name}\n{text}" for name, text in newest.items()))
 
 
-class Endurance(unittest.TestCase):
+class EnduranceNightly(unittest.TestCase):
     def assertEndsWell(self, session):
         """Everybody leaves by himself; the journal runs again to the same bits; what was recorded is a report."""
         stage = session.stage
@@ -159,10 +159,6 @@ class Endurance(unittest.TestCase):
     def test_a_minute_of_faults(self):
         made, _ = self.endure(60, seed=20)
         self.assertGreater(sum(made.values()), 3)
-
-
-class EnduranceNightly(Endurance):
-    test_a_minute_of_faults = None
 
     def test_an_hour_of_faults(self):
         made, judged = self.endure(3600, seed=21)

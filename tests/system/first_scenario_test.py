@@ -110,7 +110,7 @@ class CopiedScenario(unittest.TestCase):
                 results.append(done.stdout.splitlines()[-1])
             self.assertEqual(*results)
 
-    def test_a_demo_of_it_has_its_picture(self):
+    def test_a_demo_of_it_has_its_picture_nightly(self):
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / "mine"
             shutil.copytree(SOURCE / "scenarios" / "peg_and_box", copy)

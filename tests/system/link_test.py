@@ -51,7 +51,7 @@ class Relay(unittest.TestCase):
         self.assertIn(missing[0][2] - missing[0][0], (2, 3, 4), "in bursts")
         self.assertNotEqual(missing[0], missing[2])
 
-    def test_a_partition_loses_everything_and_ends(self):
+    def test_a_partition_loses_everything_and_ends_nightly(self):
         with Link() as link:
             link_addresses(link)
             self.assertEqual(sent_through(link, 50), list(range(50)))

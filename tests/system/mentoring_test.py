@@ -138,7 +138,7 @@ class MentoringNightly(unittest.TestCase):
         with Link(delay=0.05, jitter=0.005, loss=0.02, burst=3, seed=1) as link, Machines(link) as machines:
             near, far = ["--network", "wan"], ["--network", f"wan,{A}", "--key", machines.key]
             server = machines.start(0, "serve", PEG, "--wait-for", "right,instructor,recorder", *near)
-            server.wait_for("is open", 600)
+            server.wait_until_open(600)
             recorder = machines.start(0, "record", "-o", machines.out / "session.mcap", *near)
             recorder.wait_for("recording", 60)
             hands = ["--tracker", "none", "--device", "sigma7-sim", "--person", "none", "--arm", "--wait", 60]

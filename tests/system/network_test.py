@@ -36,7 +36,7 @@ class Machines(Stage):
 
 def mount(test, machines, server_options, station_options):
     server = machines.start(0, "serve", PEG, "--wait-for", "right", *server_options)
-    server.wait_for("is open", 600)
+    server.wait_until_open(600)
     trainee = machines.start(1, "trainee", "--seed", 1, "--key", machines.key, *station_options)
     test.assertEqual(server.wait(400), 0, server.text()[-3000:] + trainee.text()[-2000:])
     test.assertEqual(trainee.wait(60), 0, trainee.text()[-3000:])
@@ -54,7 +54,7 @@ class Networks(unittest.TestCase):
     def test_beyond_loopback_everybody_needs_the_key_unless_the_session_is_open(self):
         with Link() as link, Machines(link) as machines:
             server = machines.start(0, "serve", PEG, "--network", "lan")
-            server.wait_for("is open", 600)
+            server.wait_until_open(600)
             stranger = machines.start(1, "observer", "--network", "link0")
             self.assertEqual(stranger.wait(60), 1)
             self.assertIn("needs the key of this session", stranger.text())
@@ -62,7 +62,7 @@ class Networks(unittest.TestCase):
             server.wait_for(r"observer \(observer\) has joined", 60)
         with Link() as link, Machines(link) as machines:
             server = machines.start(0, "serve", PEG, "--network", "lan", "--open")
-            server.wait_for("is open", 600)
+            server.wait_until_open(600)
             self.assertIn("whoever hears it may join", server.text())
             machines.start(1, "observer", "--network", "lan")
             server.wait_for(r"observer \(observer\) has joined", 60)
@@ -84,7 +84,7 @@ class LimitsOfALink(unittest.TestCase):
         with Link(delay=0.005, jitter=0.03, loss=0.02, burst=3, seed=2) as link, Machines(link) as machines:
             journal = machines.out / "journal.mcap"
             server = machines.start(0, "serve", PEG, "--network", "wan", "--wait-for", "right", "--journal", journal)
-            server.wait_for("is open", 600)
+            server.wait_until_open(600)
             machines.start(1, "trainee", "--seed", 1, "--key", machines.key, "--network", f"wan,{A}")
             granted = r"right +trainee +\S+ +without input still after ([6-9]|1\d)\d ms, parked after 1\d\d\d ms"
             until = time.monotonic() + 120

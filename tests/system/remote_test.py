@@ -18,6 +18,7 @@ class Remote(unittest.TestCase):
             station = stage.start("trainee", "--device", "remote", "--address", path)
             station.wait_for("a remote hand may connect to", 30)
             station.wait_for("joined as client", 60)
+            station.wait_for("not armed: press .*the device's arming button", 30)
             client = subprocess.run([sys.executable, CLIENT, "--socket", path, "--touch=0.2,0,0.05", "--target=0,0,-0.059"],
                                     capture_output=True, text=True, timeout=300)
             self.assertEqual(client.returncode, 0, client.stdout + client.stderr + server.text()[-2000:])

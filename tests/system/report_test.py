@@ -71,6 +71,15 @@ class Report(unittest.TestCase):
                 browser("value", expression=f"document.querySelector('.steps-table tr[data-time=\"{step['begin']:g}\"]').click()")
                 browser("await", expression=f"Math.abs(tenon.session.tick / 1000 - {step['begin']}) < 0.1")
                 browser("await", expression="!document.querySelector('.plot-host .now').hidden")
+                # the player's clock is that of the tables
+                browser("await", expression=f"Math.abs(tenon.player.sessionTime - {step['begin']}) < 0.1")
+                # of the tables for engineers, too, and of the sums, which are of the whole session
+                self.assertEqual(browser("value", expression="document.querySelectorAll('tbody tr:not([data-time])').length"), 0)
+                first = self.summary["steps"][0]["begin"]
+                browser("value", expression="document.querySelector('table:not(.steps-table, .events-table) tbody tr:first-child .jump').click()")
+                browser("await", expression=f"Math.abs(tenon.session.tick / 1000 - {first}) < 0.1")
+                browser("value", expression=f"document.querySelector('.steps-table tr[data-time=\"{step['begin']:g}\"]').click()")
+                browser("await", expression=f"Math.abs(tenon.session.tick / 1000 - {step['begin']}) < 0.1")
                 # all of the poses that one sees are there
                 self.assertGreater(browser("value", expression="tenon.report.player.rate"), 29)
                 before = browser("value", expression="tenon.session.moved")
@@ -82,7 +91,7 @@ class Report(unittest.TestCase):
                 browser("await", expression="document.querySelector('.plots-section h2').textContent === 'Im Verlauf'")
                 self.assertEqual(browser("value", expression=OVERLAPS), 0, "in German")
                 told = browser("value", expression="[...document.querySelectorAll('tr[data-time] td:last-child')].map(cell => cell.textContent)")
-                for text in ("Auszubildende ist da", "Zapfen einstecken", "Zapfen", "alles ist eingebaut"):
+                for text in ("Trainee ist da", "Zapfen einstecken", "Zapfen", "alles ist eingebaut"):
                     self.assertIn(text, told, "in German")
                 if pictures:
                     browser("picture", file=f"{pictures}/report_{theme}_{width}.png")

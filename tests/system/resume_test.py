@@ -265,7 +265,13 @@ class LockstepServer(unittest.TestCase):
             server.wait_for("run: running", 300)
             time.sleep(0.5)  # of a session that takes seconds
             kill(server)
+            unfinished = resimulated(stage)
+            self.assertEqual(unfinished.returncode, 1, unfinished.stdout + unfinished.stderr)
+            said = re.search(r"(?m)^.*journal\.mcap reaches tick (\d+) and does not record how the run ended: .*--resume .*$", unfinished.stdout)
+            self.assertIsNotNone(said, unfinished.stdout)
+            self.assertRegex(unfinished.stdout, rf"(?m)^ticks 2 to {said[1]}: \d+ compared, 0 gaps$")
             server, _ = resume(stage)
+            self.assertRegex(server.text(), rf"journal\.mcap reaches tick {said[1]} and records no end of the run")
             trainee.wait_for("rejoined as client", 60)
             self.assertEqual(server.wait(300), 0, server.text())
             self.assertIn("everything is mounted", server.text())
@@ -287,7 +293,7 @@ class LockstepServer(unittest.TestCase):
 
 class Recordings(unittest.TestCase):
     # a server may be killed again before its recorder is back, or while it comes back
-    def test_over_kills_at_any_time_a_recording_has_each_tick_of_the_journal_once(self):
+    def test_over_kills_at_any_time_a_recording_has_each_tick_of_the_journal_once_nightly(self):
         with Stage(lockstep=False) as stage:
             server = begin(stage, "--wait-for", "right")
             recorder = stage.start("record", "-o", stage.out / "session.mcap", "--wait", 20)
@@ -313,7 +319,7 @@ class Recordings(unittest.TestCase):
             self.assertEqual(recording, journal, recorder.text())
             self.assertRegex(recorder.text(), rf"TickInput: {journal[-1]} of {journal[-1]} samples")
 
-    def test_a_recorder_that_stood_still_over_a_kill_has_all_ticks_or_does_not_end_well(self):
+    def test_a_recorder_that_stood_still_over_a_kill_has_all_ticks_or_does_not_end_well_nightly(self):
         for seconds in (2, 20):  # the server keeps 16,384 ticks for recorders
             with self.subTest(seconds=seconds), Stage(lockstep=False) as stage:
                 server = begin(stage, "--wait-for", "right")
@@ -342,7 +348,7 @@ class Recordings(unittest.TestCase):
 
 class Elsewhere(unittest.TestCase):
     # its folder and the cache are gone: the journal alone is there
-    def test_a_journal_of_an_own_scenario_resimulates_where_nothing_else_of_it_is(self):
+    def test_a_journal_of_an_own_scenario_resimulates_where_nothing_else_of_it_is_nightly(self):
         with Stage() as stage:
             mine = stage.out / "lab" / "mine"
             (mine.parent / "meshes").mkdir(parents=True)
@@ -432,7 +438,7 @@ class Service(unittest.TestCase):
         self.assertEqual(len(self.journals()), 2, "a new session has a file of its own")
         self.assertStops(server)
 
-    def test_a_running_session_that_is_killed_goes_on_where_it_was(self):
+    def test_a_running_session_that_is_killed_goes_on_where_it_was_nightly(self):
         server = self.start("--wait-for", "right", *COARSE)
         self.opened(server)
         trainee = self.stage.start("trainee", "--seed", 1, "--wait", 60)
@@ -480,6 +486,9 @@ class FullDisk(unittest.TestCase):
             self.assertEqual(trainee.wait(60), 0, trainee.text())
             self.assertEqual(observer.wait(60), 0)
             self.assertIn("the journal ends here", observer.text(), "people on the bus are told")
+            again = resimulated(stage)
+            self.assertEqual(again.returncode, 1, again.stdout + again.stderr)
+            self.assertRegex(again.stdout, r"journal\.mcap reaches tick \d+ and does not record how the run ended")
 
 
 class Refusals(unittest.TestCase):

@@ -8,12 +8,16 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import time
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(SOURCE / "deploy"))
+import opened  # noqa: E402
+
 PROGRAMS = Path(os.environ.get("TENON_PROGRAMS", SOURCE / "build" / "release" / "bin"))
 TENON = SOURCE / "tenon"
 # ctest names a cache of its build folder; a script that is started by hand uses one of its user
@@ -100,6 +104,10 @@ class Process:
                     raise AssertionError(f"{self.name} never printed {pattern!r}; its output:\n{output}")
                 self.changed.wait(min(remaining, 1))
 
+    def wait_until_open(self, seconds):
+        """Of a server: until its session can be joined."""
+        return self.wait_for(opened.LINE, seconds)
+
     def wait(self, seconds=300):
         """The exit code; all output is in text() then, but what a program that it left behind may print."""
         try:
@@ -146,5 +154,5 @@ class Stage:
 
     def serve(self, scenario, *arguments):
         server = self.start("serve", SOURCE / "scenarios" / scenario, *arguments)
-        server.wait_for("is open", 600)
+        server.wait_until_open(600)
         return server

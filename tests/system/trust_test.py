@@ -25,7 +25,7 @@ class Identity(unittest.TestCase):
     def test_two_sessions_run_beside_each_other(self):
         self.sessions_beside_each_other(2)
 
-    def test_eight_sessions_run_beside_each_other(self):
+    def test_eight_sessions_run_beside_each_other_nightly(self):
         self.sessions_beside_each_other(8)
 
     def sessions_beside_each_other(self, count):
@@ -62,7 +62,7 @@ class Identity(unittest.TestCase):
             self.assertEqual(second.returncode, 1, second.stdout)
             self.assertIn(f"is served already, by process {server.popen.pid} on host", second.stderr)
 
-    def test_an_old_server_that_was_stopped_and_continues_ends_itself(self):
+    def test_an_old_server_that_was_stopped_and_continues_ends_itself_nightly(self):
         with Stage(lockstep=False) as stage, tempfile.TemporaryDirectory() as elsewhere:
             old, trainee = peg_session(stage, "test")
             old.wait_for("run: running", 120)
@@ -71,7 +71,7 @@ class Identity(unittest.TestCase):
             new = Process("serve", [SOURCE / "scenarios" / "peg_and_box", *COARSE, "--wait-for", "right", "--session", "test", "--domain",
                                     stage.domain], stage.out, {"TMPDIR": elsewhere})
             stage.processes.append(new)
-            new.wait_for("is open", 120)
+            new.wait_until_open(120)
             new.wait_for(r"\(trainee\) has", 60)
             old.signal(signal.SIGCONT)
             self.assertEqual(old.wait(60), 1, old.text())
@@ -187,7 +187,7 @@ class EmergencyStop(unittest.TestCase):
             server.signal(signal.SIGKILL)
             server.wait(30)
             again = stage.serve("peg_and_box", "--wait-for", "right")
-            again.wait_for("the emergency stop stands since before this start: engaged by .*: a test", 60)
+            again.wait_for("an emergency stop raised before this server's start still stands: engaged by .*: a test", 60)
 
     def test_without_a_home_the_server_says_that_a_stop_will_not_stand_after_a_restart(self):
         with Stage(lockstep=False) as stage:
@@ -195,7 +195,7 @@ class EmergencyStop(unittest.TestCase):
                              env={"HOME": "", "XDG_STATE_HOME": ""})
             stage.processes.append(server)
             server.wait_for("tenon serve: neither HOME nor XDG_STATE_HOME is set: an emergency stop will not stand after a restart of this server", 600)
-            server.wait_for("is open", 60)
+            server.wait_until_open(60)
             observer = stage.start("observer", "--json")
             observer.wait_for('will not stand after a restart.*"what":"emergency stop"', 60)
 

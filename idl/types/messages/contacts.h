@@ -52,6 +52,7 @@ struct HandManifold {
   HandId hand;
   std::uint32_t server_epoch = 0;
   Tick tick = 0;
+  std::uint32_t sent = 0;         ///< number of this hand's manifolds on the topic so far: what is lost shows
   std::uint32_t answers_seq = 0;  ///< DeviceSample::seq of the newest sample the server had used
   ObjectId object;                ///< that this hand holds; invalid for none
   std::uint32_t object_epoch = 0;

@@ -66,9 +66,10 @@ struct SceneObject {
 struct SceneHand {
   HandId hand;
   std::string name;
-  Role role = Role::kTrainee;  ///< whose clients may move it
-  ObjectId object;             ///< that it moves while it holds no other; may be invalid
-  HandLimits limits;           ///< in force now; chosen by its station's link
+  Role role = Role::kTrainee;   ///< whose clients may move it
+  ObjectId object;              ///< that it moves while it holds no other; may be invalid
+  HandLimits limits;            ///< in force now; chosen by its station's link
+  bool guidance_alone = false;  ///< its station's link is too long for contacts (kLongestContactDelay)
 };
 
 /// State of an object for late joiners: after each jump, and once in 1000 ticks.

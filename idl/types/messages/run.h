@@ -1,6 +1,5 @@
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <string>
 
@@ -43,23 +42,16 @@ struct RecorderStatus {
 };
 
 /// One raise of the emergency stop, by any client, directly to every device and to the server. It stands
-/// until an EmergencyClear names it (StopTruth), whoever leaves meanwhile; no two raises have equal keys.
+/// until an EmergencyClear names it or a later one of its client (StopTruth), whoever leaves meanwhile; no
+/// two raises have equal keys.
 struct EmergencyStop {
   std::string client_guid;    ///< of the raiser: random, chosen by it at its start
-  std::uint32_t counter = 0;  ///< of its raises, from 1
+  std::uint32_t counter = 0;  ///< of its raises: each has a larger one than those before it
   std::string who;
   std::string reason;
 };
 
-/// The name of one raise of the emergency stop.
-struct RaiseId {
-  std::string client_guid;
-  std::uint32_t counter = 0;
-
-  auto operator<=>(const RaiseId&) const = default;
-};
-
-/// The end of one raise, by the server alone.
+/// The end of one raise, and of all that its client raised before it, by the server alone.
 struct EmergencyClear {
   std::string client_guid;    ///< of the raise
   std::uint32_t counter = 0;  ///< of the raise
@@ -70,8 +62,8 @@ struct EmergencyClear {
 /// The newest raise that the server knows of. A clear names its number, and is refused with any other one: so
 /// it lifts no raise that its sender has not been told of.
 struct NewestRaise {
-  std::uint32_t number = 0;    ///< counts from 1 in this life of the server; 0: there was none
-  std::uint32_t standing = 0;  ///< raises that stand
+  std::uint32_t number = 0;    ///< counts raises, in a range of this life of the server; 0: there was none
+  std::uint32_t standing = 0;  ///< raises that stand: of each client the newest one
   std::string who;
   std::string reason;
 };

@@ -11,7 +11,7 @@
 /// Joining a session and leaving it.
 namespace tenon {
 
-inline constexpr std::uint32_t kProtocolVersion = 11;
+inline constexpr std::uint32_t kProtocolVersion = 12;
 
 /// Published by each server in the lobby partition: the session it runs.
 struct SessionAnnounce {

@@ -45,6 +45,17 @@ struct SceneStep {
   std::string part;  ///< as in StepState
 };
 
+/// The title of the scenario in its languages: SessionAnnounce has that of the main one.
+struct SceneTitle {
+  std::vector<LocalizedText> titles;
+};
+
+/// An external signal for which conditions of the scenario wait, by the name that a Command gives.
+struct SceneSignal {
+  std::uint32_t signal = 0;  ///< index, in the order of first use
+  std::string name;
+};
+
 /// What a node of a condition tree is.
 enum class ConditionGroup : std::uint8_t {
   kSingle,  ///< a condition

@@ -8,6 +8,9 @@
 /// Work and timing of the server and the stations.
 namespace tenon {
 
+/// [s] One way: over a link with a longer delay contacts are not felt, virtual fixtures alone.
+inline constexpr double kLongestContactDelay = 0.15;
+
 /// Work and timing of the server. Maxima are over the ticks since the last sample.
 struct TickStats {
   std::uint32_t server_epoch = 0;
@@ -58,8 +61,13 @@ struct Telemetry {
   std::uint64_t samples = 0;
   double age = 0.0;     ///< [s] from device sample to the use of its answer, median since the last Telemetry
   double jitter = 0.0;  ///< [s] likewise, 99th percentile less the minimum
-  double answers_lost = 0.0;     ///< [-] share of the server's manifolds, since the last Telemetry
-  double inputs_lost = 0.0;      ///< [-] share of about 2000 of its inputs that did not reach the server
+  double answers_lost = 0.0;  ///< [-] share of the server's manifolds that did not arrive, of the last second
+                              ///< without an interruption
+  double answers_replaced = 0.0;  ///< [-] share that a newer one replaced before a cycle used them, since the
+                                  ///< last Telemetry
+  double inputs_lost = 0.0;  ///< [-] share of about 2000 of its inputs that did not reach the server, without
+                             ///< an interruption among them
+  bool guidance_alone = false;   ///< the link is too long for contacts (kLongestContactDelay)
   bool clock_known = false;      ///< the server has answered ClockSync
   double clock_offset = 0.0;     ///< [s] monotonic clock of the server less that of the station
   double clock_error = 0.0;      ///< [s] bound of what clock_offset is off

@@ -126,7 +126,7 @@ class RigRun {
     options_.needed_hands->push_back(situation_.loaded.scene->handNamed(hand.name));
     auto station =
         std::make_unique<RigStation>(hand.name, hand.p_WD, model_, *device, std::move(before_step));
-    if (model_ == RigModel::kSceneCopy) station->setScene(situation_.compiled);
+    if (model_ == RigModel::kSceneCopy) station->setCopies(haptic::copiesOf(situation_.compiled, 1));
     RigStation* const added = station.get();
     devices_.push_back(std::move(device));
     stations_.push_back(std::move(station));

@@ -36,7 +36,7 @@ class RigStation final : public haptic::Station {
   [[nodiscard]] double coupling() const { return newest_.stiffness; }
   [[nodiscard]] Role role() const override { return Role::kTrainee; }
   [[nodiscard]] Result<void> armDevices() override { return {}; }
-  void setScene(const std::shared_ptr<const simulation::Scene>& scene) override { hand_.setScene(scene); }
+  void setCopies(haptic::SceneCopies&& copies) override { hand_.setCopy(std::move(copies.at(0))); }
   [[nodiscard]] haptic::ForceModelKind forceModel() const noexcept override {
     return model_ == RigModel::kSceneCopy ? haptic::ForceModelKind::kSceneCopy
                                           : haptic::ForceModelKind::kManifold;

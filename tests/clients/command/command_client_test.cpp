@@ -1,6 +1,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,6 +56,7 @@ void runStoppedServer(std::uint32_t domain) {
   auto raises = wire::Writer<NewestRaise>::open(session, wire::kNewestRaise);
   if (!announces || !welcomes || !acks || !runs || !raises) _exit(1);
   (void)raises->write({.number = 7, .standing = 3, .who = "Ben", .reason = "caught"});
+  (void)runs->write({.phase = RunPhase::kStopped, .tick = 1, .reason = "after the raise"});
   (void)announces->write({.session = "test", .server_epoch = 7});
   wire::Inbox inbox;
   auto heard = inbox.on<Join>(lobby, wire::kJoin, [&](const Join& join) {
@@ -113,11 +115,31 @@ TEST(CommandClient, AClearNamesTheRaisesThatItsSenderHasHeardOf) {
   const std::atomic<bool> stop = false;
   auto client = CommandClient::open({.domain = domain, .timeout = std::chrono::seconds(60)}, stop);
   ASSERT_TRUE(client) << client.error().what;
+  std::string told;
+  (*client)->report_raise = [&](const std::string& line) { told += line + "\n"; };
   auto sent = (*client)->send({.command = CommandKind::kClearEmergencyStop}, stop);
   EXPECT_TRUE(sent) << sent.error().what;
   EXPECT_EQ((*client)->toldRaise(), 7U);
   sent = (*client)->send({.command = CommandKind::kClearEmergencyStop, .value = 6.0}, stop);
   EXPECT_FALSE(sent) << "by one who was told of the sixth";
+  EXPECT_THAT(told, ::testing::HasSubstr("emergency stop by Ben: caught, the newest of 3 raises\n"));
+}
+
+TEST(CommandClient, AClearShowsWhatItClearsAlsoWhenThatWasHeardWhileItConnected) {
+  const std::uint32_t domain = test::ownDomain();
+  const test::Peer server([domain] { runStoppedServer(domain); });
+  const std::atomic<bool> stop = false;
+  auto client = CommandClient::open({.domain = domain, .timeout = std::chrono::seconds(60)}, stop);
+  ASSERT_TRUE(client) << client.error().what;
+  // by then the raise, which was written before it, is here as well
+  for (int i = 0; i < 3000 && !(*client)->isOver(); ++i) (*client)->dispatch(std::chrono::milliseconds(20));
+  ASSERT_TRUE((*client)->isOver());
+  EXPECT_EQ((*client)->toldRaise(), 0U) << "nobody was there to be told";
+  testing::internal::CaptureStdout();
+  EXPECT_EQ(commandOnce(**client, {"clear"}, stop), 0);
+  EXPECT_EQ(testing::internal::GetCapturedStdout(),
+            "emergency stop by Ben: caught, the newest of 3 raises\nclear: accepted\n");
+  EXPECT_EQ((*client)->toldRaise(), 7U);
 }
 
 }  // namespace

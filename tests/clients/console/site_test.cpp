@@ -82,18 +82,26 @@ TEST_F(SiteTest, ServesAssetsByTheirContent) {
   EXPECT_EQ(bodyOf(answer), model);
   EXPECT_EQ(answer.type, "model/gltf-binary");
   EXPECT_TRUE(answer.is_immutable);
+  EXPECT_TRUE(answer.body.empty()) << "it is read while it is sent";
   const Answer part = site.answer("/assets/" + *name, "bytes=5-7");
   EXPECT_EQ(part.status, 206U);
   EXPECT_EQ(bodyOf(part), "and");
+}
 
-  const Answer head = site.answer("/assets/" + *name, {}, false);
-  EXPECT_TRUE(head.body.empty());
-  EXPECT_EQ(head.part->size, model.size());
-  EXPECT_EQ(head.type, answer.type);
-  EXPECT_TRUE(head.is_immutable);
-
-  write(folder_ / "assets" / *name, "glTF and other");  // damaged
-  EXPECT_EQ(site.answer("/assets/" + *name).status, 404U);
+TEST_F(SiteTest, AnAssetIsToBeCheckedOnceUntilItIsWrittenAnew) {
+  Site site(folder_ / "page", assets_);
+  const std::string model = "glTF and more";
+  const auto name = assets_.put({reinterpret_cast<const std::uint8_t*>(model.data()), model.size()});
+  ASSERT_TRUE(name) << name.error().what;
+  const std::string target = "/assets/" + *name;
+  EXPECT_EQ(site.unchecked(target + "?x"), *name);
+  site.setChecked(*name, versionOf(assets_.fileOf(*name)));
+  EXPECT_FALSE(site.unchecked(target));
+  write(assets_.fileOf(*name), "glTF and other");
+  EXPECT_EQ(site.unchecked(target), *name);
+  for (const char* other :
+       {"/", "/recording.mcap", "/assets/", "/assets/../secret", "/assets/000000000000000000000000000000"})
+    EXPECT_FALSE(site.unchecked(other)) << other;
 }
 
 TEST(Origin, PagesOfThisServerAndPermittedOnesMayConnect) {
@@ -108,6 +116,20 @@ TEST(Origin, PagesOfThisServerAndPermittedOnesMayConnect) {
        {"http://localhost:8081", "https://localhost:8080", "http://localhost", "null", "http://evil.example",
         "http://localhost:8080.evil.example", "https://viewer.example.evil"})
     EXPECT_FALSE(isPermittedOrigin(origin, "localhost:8080", false, others)) << origin;
+}
+
+TEST(Handshake, ItsKeyIs16BytesInBase64) {
+  EXPECT_TRUE(isHandshakeKey("dGhlIHNhbXBsZSBub25jZQ==")) << "that of RFC 6455";
+  for (const char* key : {"", "abc", "dGhlIHNhbXBsZSBub25jZQ", "dGhlIHNhbXBsZSBub25jZQ=",
+                          "dGhlIHNhbXBsZSBub25jZR==", "dGhlIHNhbXBsZSBub25j Q==", "dGhlIHNhbXBsZSBub25jZWVl"})
+    EXPECT_FALSE(isHandshakeKey(key)) << key;
+}
+
+TEST(Host, LocalhostHasNoCase) {
+  for (const char* host : {"localhost", "LOCALHOST:8080", "LocalHost"})
+    EXPECT_TRUE(isLoopbackHost(host)) << host;
+  for (const char* host : {"localhost.evil.example", "localhos", "", "LOCALHOST1"})
+    EXPECT_FALSE(isLoopbackHost(host)) << host;
 }
 
 TEST(Policy, LetsThePageReadRecordingsOfTheServersThatAreNamed) {

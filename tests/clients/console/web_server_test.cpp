@@ -88,6 +88,37 @@ TEST_F(WebServerTest, ADownloadThatStandsStillEnds) {
   EXPECT_LT(take(connection).size(), kFile);
 }
 
+/// How often this process has `file` open.
+std::ptrdiff_t openings(const fs::path& file) {
+  const fs::directory_iterator descriptors("/proc/self/fd");
+  return std::count_if(fs::begin(descriptors), fs::end(descriptors), [&](const fs::directory_entry& one) {
+    std::error_code ignored;
+    return fs::read_symlink(one.path(), ignored) == file;
+  });
+}
+
+TEST_F(WebServerTest, WhatAPageHasLeftInTheMiddleIsReadNoFarther) {
+  server_->stop();
+  Site site(folder_ / "none", wire::AssetStore(folder_));
+  ASSERT_TRUE(site.serveRecording(folder_ / "a.mcap"));
+  // what is left ends by being left, not for standing still
+  server_ =
+      WebServer::open({.port = 0, .send_timeout = std::chrono::minutes(10)}, std::move(site), {}).value();
+  server_->start();
+  std::vector<int> pages;
+  for (int i = 0; i < 5; ++i) {
+    pages.push_back(ask("GET"));
+    char first = 0;
+    ASSERT_EQ(recv(pages.back(), &first, 1, 0), 1);
+  }
+  const std::ptrdiff_t while_read = openings(folder_ / "a.mcap");
+  EXPECT_GE(while_read, 5);
+  for (const int page : pages) close(page);
+  for (int i = 0; i < 6000 && openings(folder_ / "a.mcap") > while_read - 5; ++i)
+    std::this_thread::sleep_for(milliseconds(10));
+  EXPECT_EQ(openings(folder_ / "a.mcap"), while_read - 5);
+}
+
 TEST_F(WebServerTest, HeadSaysTheSizeAndSendsNothingOfIt) {
   const std::string answer = take(ask("HEAD"));
   EXPECT_NE(answer.find("Content-Length: " + std::to_string(kFile) + "\r\n"), std::string::npos) << answer;
@@ -110,9 +141,13 @@ TEST_F(WebServerTest, SendsAllWhenARangeIsAskedForOnCondition) {
   EXPECT_EQ(answer.size() - (answer.find("\r\n\r\n") + 4), kFile);
 }
 
+/// [bytes] that the kernel keeps unread for a client of these tests, whatever the machine's settings are.
+constexpr int kReceiveBuffer = 256 << 10;
+
 /// A connection from an address of the loopback interface, which stands for another machine.
 int connectFrom(const char* own, std::uint16_t port) {
   const int connection = socket(AF_INET, SOCK_STREAM, 0);
+  setsockopt(connection, SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof kReceiveBuffer);
   const timeval patience{10, 0};
   setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   sockaddr_in address{};
@@ -139,11 +174,16 @@ std::string statusFrom(const char* own, std::uint16_t port) {
 /// Somebody who looks on.
 class OnlookerMock {
  public:
-  OnlookerMock(const char* own, std::uint16_t port) : socket_(connectFrom(own, port)) {
+  /// `headers`: lines with their ends.
+  OnlookerMock(const char* own, std::uint16_t port, const std::string& headers = {},
+               const std::string& room = "/live")
+      : socket_(connectFrom(own, port)) {
     const std::string request =
-        "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "GET " + room +
+        " HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-        "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n";
+        "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n" +
+        headers + "\r\n";
     EXPECT_EQ(write(socket_, request.data(), request.size()), static_cast<ssize_t>(request.size()));
     std::string head;
     while (!head.ends_with("\r\n\r\n")) {
@@ -152,32 +192,36 @@ class OnlookerMock {
       head += next;
     }
     EXPECT_TRUE(head.starts_with("HTTP/1.1 101 ")) << head;
-    EXPECT_NE(text().find("serverInfo"), std::string::npos) << "it has entered";
+    first_ = text();
   }
   ~OnlookerMock() { close(socket_); }
   OnlookerMock(const OnlookerMock&) = delete;
   OnlookerMock& operator=(const OnlookerMock&) = delete;
 
-  /// Asks the desk for a seat; the answer.
-  std::string sit() {
-    const std::string request = R"({"op":"deskSit","id":7,"role":"instructor","name":"","key":""})";
+  /// What came first: of one that has entered its room, the server's info.
+  [[nodiscard]] const std::string& first() const { return first_; }
+  void send(const std::string& request) const {
     const std::string mask(4, '\0');
     const std::string frame{"\x81" + std::string(1, static_cast<char>(0x80 | request.size())) + mask +
                             request};
     EXPECT_EQ(write(socket_, frame.data(), frame.size()), static_cast<ssize_t>(frame.size()));
+  }
+  /// Asks the desk for a seat; the answer.
+  std::string sit() {
+    send(R"({"op":"deskSit","id":7,"role":"instructor","name":"","key":""})");
     for (std::string answer; !(answer = text()).empty();)
       if (answer.find("deskAnswer") != std::string::npos) return answer;
     return {};
   }
-  /// The next text or, of its end, the reason; empty: nothing came.
+  /// The next message or, of its end, the reason; empty: nothing came.
   std::string text() {
     std::string head = bytes(2);
     if (head.empty()) return {};
     std::size_t size = static_cast<std::uint8_t>(head[1]);
-    if (size == 126) {
-      const std::string length = bytes(2);
-      size = static_cast<std::size_t>(static_cast<std::uint8_t>(length[0])) << 8U |
-             static_cast<std::uint8_t>(length[1]);
+    if (size >= 126) {
+      const std::string length = bytes(size == 126 ? 2 : 8);
+      size = 0;
+      for (const char digit : length) size = size << 8U | static_cast<std::uint8_t>(digit);
     }
     const std::string content = bytes(size);
     const bool is_end = (static_cast<std::uint8_t>(head[0]) & 0x0fU) == 8U;
@@ -192,6 +236,7 @@ class OnlookerMock {
   }
 
   int socket_;
+  std::string first_;
 };
 
 /// A server that gives a seat to whoever asks.
@@ -207,8 +252,10 @@ class CrowdedWebServerTest : public testing::Test {
     handlers.desk = [this](ViewerId viewer, const std::string&, const DeskRequest& request) {
       server_->answer(viewer, {.id = request.id, .accepted = true, .role = request.role});
     };
-    server_ = WebServer::open({.port = 0}, std::move(site), std::move(handlers)).value();
-    server_->addRoom(std::string(kFirstRoom), {});
+    server_ =
+        WebServer::open({.port = 0, .heartbeat = milliseconds(50)}, std::move(site), std::move(handlers))
+            .value();
+    server_->addRoom(std::string(kFirstRoom), {{.id = 1, .topic = "events", .delivery = Delivery::kEach}});
     server_->start();
   }
   ~CrowdedWebServerTest() override {
@@ -249,6 +296,87 @@ TEST_F(CrowdedWebServerTest, DownloadsThatNobodyReadsKeepNobodyOut) {
   for (const char* own : {"127.0.0.1", "127.0.0.2"})
     EXPECT_EQ(statusFrom(own, server_->port()), "HTTP/1.1 200");
   for (const int download : downloads) close(download);
+}
+
+TEST_F(CrowdedWebServerTest, TellsWhoAsksForARoomThatIsNotThereByTheReasonOfTheClose) {
+  OnlookerMock late("127.0.0.1", server_->port(), {}, "/live/gone");
+  EXPECT_EQ(late.first(),
+            "there is no such session: it has ended or not begun, or this gateway shows too many");
+}
+
+TEST_F(CrowdedWebServerTest, PagesOfThisServerAloneGetAHeartbeat) {
+  OnlookerMock program("127.0.0.1", server_->port());
+  OnlookerMock page("127.0.0.1", server_->port(), "Origin: http://localhost\r\n");
+  EXPECT_NE(page.first().find("serverInfo"), std::string::npos);
+  EXPECT_NE(page.text().find("advertise"), std::string::npos);
+  for (int beat = 0; beat < 3; ++beat) EXPECT_EQ(page.text(), R"({"op":"heartbeat"})");
+  EXPECT_NE(program.text().find("advertise"), std::string::npos);
+  program.send(R"({"op":"deskSit","id":7,"role":"instructor","name":"","key":""})");
+  EXPECT_NE(program.text().find("deskAnswer"), std::string::npos) << "and no heartbeat before";
+}
+
+TEST_F(CrowdedWebServerTest, NothingOfAFormerSessionComesOnceTheNextOneHasBegun) {
+  constexpr int kOld = 2'000;
+  constexpr std::size_t kSize = 64U << 10U;  // [bytes] all of them are more than sockets keep
+  OnlookerMock slow("127.0.0.1", server_->port());
+  EXPECT_NE(slow.text().find("advertise"), std::string::npos);
+  slow.send(R"({"op":"subscribe","subscriptions":[{"id":5,"channelId":1}]})");
+  EXPECT_NE(slow.sit().find("deskAnswer"), std::string::npos) << "it has subscribed";
+  const auto event = [&](char content) {
+    return Publication{.channel = 1,
+                       .payload = std::make_shared<const std::vector<std::uint8_t>>(kSize, content)};
+  };
+  server_->publish(std::string(kFirstRoom), std::vector<Publication>(kOld, event('o')));
+  server_->publish(std::string(kFirstRoom), {Publication{}, event('n')});
+  int old = 0;
+  std::string message = slow.text();
+  for (; !message.empty() && message.back() == 'o'; message = slow.text()) ++old;
+  ASSERT_FALSE(message.empty());
+  EXPECT_EQ(message.back(), 'n');
+  EXPECT_LT(old, kOld / 2) << "those that were on their way alone";
+}
+
+/// [bytes] of memory that this process has now.
+std::size_t memoryNow() {
+  std::size_t all = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+TEST_F(CrowdedWebServerTest, AnAssetIsReadWhileItIsSentHoweverManyAskForIt) {
+  constexpr std::size_t kSize = 32U << 20U, kReaders = 24;
+  const wire::AssetStore assets(folder_);
+  const std::string name = assets.put(std::vector<std::uint8_t>(kSize, 7)).value();
+  const auto ask = [&] {
+    const int connection = connectFrom("127.0.0.2", server_->port());
+    const std::string request =
+        "GET /assets/" + name + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+    EXPECT_EQ(write(connection, request.data(), request.size()), static_cast<ssize_t>(request.size()));
+    char first = 0;
+    EXPECT_EQ(recv(connection, &first, 1, 0), 1);
+    return connection;
+  };
+  std::string piece(1U << 20U, '\0');
+  std::size_t size = 1;
+  const int whole = ask();
+  for (ssize_t got; (got = recv(whole, piece.data(), piece.size(), 0)) > 0;)
+    size += static_cast<std::size_t>(got);
+  close(whole);
+  EXPECT_GT(size, kSize);
+
+  const std::size_t before = memoryNow();
+  std::vector<int> slow;
+  for (std::size_t i = 0; i < kReaders; ++i) slow.push_back(ask());
+  EXPECT_LT(memoryNow(), before + kReaders * kSize / 4);
+  for (const int connection : slow) close(connection);
+
+  // of a damaged one nothing is sent
+  std::fstream(assets.fileOf(name), std::ios::in | std::ios::out) << "x";
+  const int damaged = ask();
+  std::string answer(11, '\0');
+  EXPECT_EQ(recv(damaged, answer.data(), answer.size(), MSG_WAITALL), static_cast<ssize_t>(answer.size()));
+  EXPECT_EQ(answer, "TTP/1.1 404");
+  close(damaged);
 }
 
 TEST(LoopbackAddress, IsOneThatThisMachineAloneReaches) {

@@ -125,5 +125,17 @@ TEST_F(AnswerReadersTest, DoNotWaitForManifoldsOfAnAbsentHand) {
   expectRead(0, 1);
 }
 
+TEST_F(AnswerReadersTest, CountWhatDoesNotArriveAndNotWhatCameInOneGo) {
+  ASSERT_TRUE(readers_->open());
+  ASSERT_TRUE(hearUntil([&] { return matches(1, 0); }));
+  constexpr std::size_t kSent = 21;
+  for (std::uint32_t sent = 1; sent <= kSent + 4; ++sent)
+    if (sent % 6 != 0) {
+      ASSERT_TRUE(manifolds_.write({.hand = HandId{1}, .tick = 2 * sent + 1, .sent = sent}));
+    }
+  ASSERT_TRUE(hearUntil([&] { return of_each_tick_ == kSent; }));
+  EXPECT_NEAR(readers_->takeLoss().value_or(-1.0), 4.0 / 24.0, 1e-9);
+}
+
 }  // namespace
 }  // namespace tenon::haptic

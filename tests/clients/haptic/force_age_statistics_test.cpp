@@ -36,27 +36,20 @@ TEST(DurationHistogram, LongDurationsAreExactToTwoPercent) {
   EXPECT_EQ(durations.count(), 0U);
 }
 
-TEST(AnswerLoss, IsThatOfTheHandThatLostMost) {
-  AnswerLoss loss;
-  EXPECT_EQ(loss.share(), 0.0);
-  for (Tick tick = 1; tick <= 100; ++tick) {
-    if (tick % 10 != 5) loss.received(HandId{0}, tick);
-    if (tick % 10 == 0) loss.received(HandId{7}, tick);  // a tracked limb
-    if (tick > 3) loss.received(HandId{0}, 3);           // again
-  }
-  EXPECT_NEAR(loss.share(), 0.1, 1e-9);
-  loss.clear();
-  EXPECT_EQ(loss.share(), 0.0);
-}
-
-TEST(AnswerLoss, OfSlowAnswersIsThatOfThoseInTurn) {
-  AnswerLoss loss;
-  for (Tick tick = 1; tick <= 10'000; ++tick) {
-    const bool is_in_turn = tick % AnswerLoss::kSlowTicks == 0, is_lost = tick % 200 == 0;
-    const bool is_out_of_turn = tick % 40 == 3 || tick % 40 == 5;
-    if ((is_in_turn && !is_lost) || is_out_of_turn) loss.received(HandId{0}, tick);
-  }
-  EXPECT_NEAR(loss.share(), 0.1, 0.005);
+//  cycle      1     2       3     answers 2 and 3 come in one cycle, 4 after 5
+//  answers    1     2 3     5 4
+TEST(ReplacedAnswers, AreThoseThatANewerOneReplacedBeforeACycleUsedThem) {
+  ReplacedAnswers replaced;
+  EXPECT_EQ(replaced.take(), 0.0);
+  replaced.received(HandId{0}, 1, 1);
+  replaced.received(HandId{0}, 2, 2);
+  replaced.received(HandId{0}, 3, 2);
+  replaced.received(HandId{0}, 5, 3);
+  replaced.received(HandId{0}, 4, 3);
+  replaced.received(HandId{0}, 5, 3);  // again
+  replaced.received(HandId{1}, 1, 3);
+  EXPECT_DOUBLE_EQ(replaced.take(), 2.0 / 5.0);
+  EXPECT_EQ(replaced.take(), 0.0);
 }
 
 //  input     1   2   3            each answered after 2 ms; the second answer to 2 is from the other hand
@@ -79,7 +72,7 @@ TEST(ForceAgeStatistics, CountsTheTimeFromAnInputToItsFirstAnswerOnce) {
   EXPECT_DOUBLE_EQ(telemetry.input_to_force_max, 2e-3);
   EXPECT_LE(telemetry.loop_late_p99, kBin) << "the loop was on time";
   EXPECT_NEAR(telemetry.age, 2e-3, 2 * kBin);
-  EXPECT_EQ(telemetry.answers_lost, 0.0);
+  EXPECT_DOUBLE_EQ(telemetry.answers_replaced, 3.0 / 13.0) << "those of tick 1 that came after tick 10";
   age.fill(telemetry);
   EXPECT_EQ(telemetry.samples, 10U);
   EXPECT_EQ(telemetry.age, 0.0) << "none since the last one";

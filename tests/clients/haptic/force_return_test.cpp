@@ -118,6 +118,33 @@ INSTANTIATE_TEST_SUITE_P(
              (std::get<2>(one.param) == Target::kInScene ? "msScene" : "msDevice");
     });
 
+// The delay of the link swings about the fresh limit, and the person presses on:
+//
+//   force  5 N --.   .-.                          .---
+//                 `._|  `.______________________.´     one return, then none before the link is calm
+TEST(ForceReturnAfterManyGaps, AHandThatPressesDoesNotDriftThroughItsWorkspace) {
+  for (const int fresh : {20, 50, 90}) {
+    RestingHand setup("hug-sim");
+    const Vector3 centre = setup.hand.workspace().centre();
+    const auto drifted = [&] { return (setup.hand.workspace().centre() - centre).norm(); };
+    double first = 0.0;
+    for (int gap = 0; gap < 40; ++gap) {
+      for (int i = 0; i < 70; ++i) setup.hold(false);
+      for (int i = 0; i < fresh; ++i) {
+        setup.hold(true);
+        ASSERT_LE(setup.force(), setup.before + 0.1);
+      }
+      if (gap == 0) first = drifted();
+    }
+    EXPECT_GT(first, 1e-4);
+    EXPECT_LE(drifted(), 0.015)
+        << "of 40 gaps the arm, which reaches 14 mm into the floor, drifts in two at most; after " << fresh
+        << " fresh ms";
+    for (int i = 0; i < 6000; ++i) setup.hold(true);
+    EXPECT_NEAR(setup.force(), setup.before, 1.6) << "a calm link gives the force back";
+  }
+}
+
 std::string nameOf(const testing::TestParamInfo<std::string>& device) {
   return device.param.substr(0, device.param.find('-'));
 }
@@ -160,6 +187,23 @@ TEST_P(ForceReturnOf, AJumpOfTheBodyItTouchesIsSoft) {
   setup.server.floor_height += 0.02;
   setup.target = Target::kAtDevice;
   setup.expectSoftReturn([&] { setup.hold(true); });
+}
+
+// a fifth body, for which the manifold's table has no place; `before`: its frame comes before its manifold
+TEST_P(ForceReturnOf, AJumpOfABodyThatIsNotListedIsSoft) {
+  for (const bool before : {false, true}) {
+    RestingHand setup(GetParam());
+    ASSERT_FALSE(setup.server.lists_floor);
+    for (int i = 0; i < 50; ++i) setup.hold(true);
+    ++setup.server.floor_epoch;
+    setup.server.floor_height += 0.02;
+    setup.target = Target::kAtDevice;
+    if (before) {
+      setup.world.receive(setup.server.frame(setup.tick));
+      setup.hold(false);
+    }
+    setup.expectSoftReturn([&] { setup.hold(true); });
+  }
 }
 
 TEST_P(ForceReturnOf, AJumpWhileContactsAreLateIsSoft) {

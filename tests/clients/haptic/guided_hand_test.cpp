@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -86,6 +87,63 @@ TEST_P(GuidedHandOf, AStopTakesItsForceAtOnceAndAfterwardsItBeginsFromZero) {
     last = guidance;
   }
   EXPECT_GT(setup.force(), 1.0) << "it was not ended";
+}
+
+/// A guided hand whose answers come `delay` [ms] after their inputs.
+struct FarGuidedHand : GuidedHand {
+  using GuidedHand::GuidedHand;
+
+  void hold(const Vector3& p_WI) {
+    ++message.tick;
+    if (heard) hand.receive(message);
+    intend(p_WI);
+    ++tick;
+    world.receive(server.frame(tick));
+    HandManifold manifold = server.manifold(tick, hand.pose());
+    manifold.answers_seq = tick > delay ? static_cast<std::uint32_t>(tick - delay) : 0;
+    hand.receive(manifold);
+    hand.step(static_cast<std::uint32_t>(tick), world, kTickSeconds);
+    if (hand.events().guidance_alone_began) ++began;
+    if (hand.events().guidance_alone_ended) ++ended;
+    largest_step = std::max(largest_step, force() - last_force);
+    last_force = force();
+  }
+  void holdFor(int milliseconds, const Vector3& p_WI) {
+    for (int i = 0; i < milliseconds; ++i) hold(p_WI);
+  }
+
+  Tick delay = 1;  ///< [ticks] there and back
+  int began = 0, ended = 0;
+  double last_force = 0.0, largest_step = 0.0;  ///< [N]
+};
+
+TEST_P(GuidedHandOf, OverALinkTooLongForContactsIsGuidedAndFeelsNoContact) {
+  FarGuidedHand setup(GetParam());
+  const Vector3 into_floor(0.0, 0.0, -0.01);
+  setup.holdFor(2000, into_floor);
+  ASSERT_GT(setup.force(), 1.0) << "the floor is felt";
+  setup.delay = 330;  // 165 ms one way
+  setup.holdFor(6000, into_floor);
+  EXPECT_EQ(setup.began, 1) << "it is told once";
+  EXPECT_EQ(setup.ended, 0);
+  EXPECT_NEAR(setup.hand.linkDelay(), 0.165, 1e-9);
+  EXPECT_NEAR(setup.force(), 0.0, 0.01) << "no contact";
+  setup.lead(setup.hand.pose().translation() + Vector3(0.0, 0.2, 0.0));
+  setup.last_force = setup.force();
+  setup.largest_step = 0.0;
+  setup.holdFor(3000, into_floor);
+  EXPECT_GT(setup.hand.state().guidance_force, 1.0F);
+  EXPECT_GT(setup.force(), 1.0) << "it passes the safety layer";
+  EXPECT_LE(setup.largest_step, 0.1) << "no jolt";
+  setup.heard = false;
+  setup.holdFor(500, into_floor);
+  EXPECT_NEAR(setup.force(), 0.0, 0.01) << "its messages have an age of their own";
+  setup.delay = 250;
+  setup.holdFor(3000, into_floor);
+  EXPECT_EQ(setup.ended, 1);
+  EXPECT_EQ(setup.began, 1);
+  EXPECT_GT(setup.force(), 1.0) << "contacts are felt again";
+  EXPECT_LE(setup.largest_step, 0.1) << "softly";
 }
 
 TEST_P(GuidedHandOf, WhenMessagesEndTheForceFallsToZeroWithoutAJump) {

@@ -46,7 +46,10 @@ class RecordingDevice final : public devices::HapticDevice {
     state.fault = DeviceFault::kNone;
     return {};
   }
-  void read(devices::DeviceState& out) noexcept override { out = state; }
+  void read(devices::DeviceState& out) noexcept override {
+    ++state.seq;
+    out = state;
+  }
   void write(const devices::DeviceCommand& command) noexcept override {
     if (!state.forces_on) return;
     calls.emplace_back(command.brake ? "brake" : "write");
@@ -80,6 +83,37 @@ TEST(HandSafety, AStopBrakesTheDeviceBeforeItSwitchesTheForcesOff) {
   setup.hand.permitForces(false);
   setup.step();
   EXPECT_THAT(setup.device.calls, testing::ElementsAre("brake", "disarm"));
+}
+
+TEST(HandSafety, AStationThatIsNotArmedSaysSoAndNoEmergencyStop) {
+  RecordingDevice device(devices::sigma7Model().caps);
+  HapticHand hand(device);
+  WorldView world;
+  std::uint32_t seq = 0;
+  std::vector<SafetyRule> began;
+  const auto step = [&] {
+    hand.step(++seq, world, kTickSeconds);
+    for (const auto& intervention : hand.events().interventions)
+      if (intervention.began) began.push_back(intervention.rule);
+    return hand.state().safety_flags;
+  };
+  hand.begin(test::kHand, ClientId{1}, Vector3::Zero(), false);
+  device.state.forces_on = true;
+  device.calls.clear();
+  EXPECT_TRUE(step() & devices::bit(SafetyRule::kNotArmed));
+  EXPECT_THAT(device.calls, testing::ElementsAre("brake", "disarm"));
+  EXPECT_FALSE(hand.input().active);
+  EXPECT_FALSE(step() & devices::bit(SafetyRule::kEmergencyStop));
+  EXPECT_THAT(began, testing::Contains(SafetyRule::kNotArmed));
+  EXPECT_THAT(began, testing::Not(testing::Contains(SafetyRule::kEmergencyStop)));
+  hand.permitForces(false);
+  EXPECT_EQ(step() & (devices::bit(SafetyRule::kNotArmed) | devices::bit(SafetyRule::kEmergencyStop)),
+            devices::bit(SafetyRule::kEmergencyStop));
+  hand.permitForces(true);
+  ASSERT_TRUE(hand.armDevice());
+  hand.handBack();
+  EXPECT_FALSE(step() & (devices::bit(SafetyRule::kNotArmed) | devices::bit(SafetyRule::kEmergencyStop)));
+  EXPECT_TRUE(hand.input().active);
 }
 
 TEST(HandSafety, AtTheEndTheForceFallsToZeroAndThenTheDeviceIsDisarmed) {
@@ -279,6 +313,39 @@ TEST(AnswerAge, AfterALongGapOldAnswersAreNotFresh) {
   for (; seq <= 8800; ++seq) age.step(seq, 2998, 1e-3);
   age.step(seq, seq - 300, 1e-3);
   EXPECT_NEAR(age.excess(), 0.296, 1e-9);
+}
+
+TEST(AnswerAge, ALinkIsTooLongOnceItsAnswersHaveBeenForASecond) {
+  AnswerAge age;
+  std::uint32_t seq = 0;
+  const auto stepWith = [&](std::uint32_t delay) {
+    ++seq;
+    age.step(seq, seq > delay ? seq - delay : 0, 1e-3);
+  };
+  while (seq < 300) stepWith(2);
+  while (seq < 320 + 900) stepWith(400);  // answers of 0.9 s, among them those of the last windows
+  EXPECT_FALSE(age.isTooLong());
+  while (seq < 300 + 4000) stepWith(330);
+  EXPECT_FALSE(age.isTooLong()) << "the delay is the smallest age within two windows of 2 s";
+  while (seq < 300 + 6000) stepWith(330);
+  EXPECT_TRUE(age.isTooLong());
+  EXPECT_NEAR(age.delay(), 0.33, 1e-9);
+  stepWith(315);
+  EXPECT_TRUE(age.isTooLong()) << "hysteresis";
+  stepWith(300);
+  EXPECT_FALSE(age.isTooLong()) << "150 ms one way";
+}
+
+TEST(AnswerAge, ALateAnswerAfterAnInterruptionIsNoLongLink) {
+  AnswerAge age;
+  std::uint32_t seq = 0;
+  while (++seq <= 3000) age.step(seq, seq > 10 ? seq - 10 : 0, 1e-3);
+  const std::uint32_t last = seq - 11;
+  for (; seq <= 9000; ++seq) age.step(seq, last, 1e-3);
+  age.step(seq, seq - 500, 1e-3);  // the only answer for a while
+  for (++seq; seq <= 10'500; ++seq) age.step(seq, 8501, 1e-3);
+  age.step(seq, seq - 500, 1e-3);
+  EXPECT_FALSE(age.isTooLong());
 }
 
 TEST(Bracelet, IsSilentAndDisarmedAtTheEnd) {

@@ -74,6 +74,27 @@ TEST(LinkClock, StatesTheJitterOfTheRoundTripsAndAsksOftenAtFirst) {
   EXPECT_NEAR(telemetry.trip_jitter, 0.004, 1e-9);
 }
 
+// a partition of 3 s, then either a rejoin or the server's own statement of the gap
+TEST(LinkClock, WhatIsNotReceivedInAnInterruptionIsNoLossOfTheLink) {
+  for (const bool rejoins : {true, false}) {
+    LinkClock clock;
+    ClockSync answer{.client = ClientId{1}, .server_received_ns = 1, .server_sent_ns = 1};
+    for (std::uint32_t seq = 1; seq <= 12'000; ++seq) {
+      clock.sent(seq, 1);
+      if (seq > 3000 && seq <= 6000) continue;
+      ++answer.inputs_received;
+      answer.newest_seq = seq;
+      answer.longest_gap = !rejoins && seq > 6000 && seq < 8000 ? 3.0 : 0.002;
+      if (rejoins && seq == 6001) clock.interrupted();
+      if (seq % 200 == 0) clock.receive(answer, 2);
+      Telemetry telemetry;
+      clock.fill(telemetry, 2);
+      ASSERT_EQ(telemetry.inputs_lost, 0.0) << seq;
+    }
+    EXPECT_TRUE(clock.lossKnown());
+  }
+}
+
 TEST(LinkClock, AnotherServerBeginsAnew) {
   LinkClock clock;
   for (std::uint32_t seq = 1; seq <= 5000; ++seq) clock.sent(seq, 1);

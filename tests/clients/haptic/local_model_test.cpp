@@ -1,6 +1,7 @@
 #include "clients/haptic/local_model.h"
 
 #include <algorithm>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -97,6 +98,41 @@ TEST(LocalModel, ExpectsPlanesWhereTheirBodiesAreByNow) {
   EXPECT_NEAR(proxyHeight(0.5, 2.0), 0.013, 1e-6);
   EXPECT_NEAR(proxyHeight(0.5, 20.0), 0.012 + LocalModel::kFarthestExpectation, 1e-6) << "it may stop";
   EXPECT_NEAR(proxyHeight(5.0, 20.0), 0.012, 1e-8) << "a displacement of one tick";
+}
+
+TEST(Coupling, AProxyThatIsNoNumberIsForgottenWithTheNext) {
+  Coupling coupling({.damping = 5.0});
+  LocalProxy proxy;
+  proxy.active = true;
+  proxy.stiffness = 1000.0;
+  proxy.X_WS = Pose(Vector3(0.0, 0.0, 0.002));
+  for (const bool first : {true, false}) {
+    if (!first) (void)coupling.step(proxy, Pose(), kStep);
+    LocalProxy bad = proxy;
+    bad.X_WS = Pose(Vector3::Constant(std::numeric_limits<double>::quiet_NaN()));
+    EXPECT_FALSE(coupling.step(bad, Pose(), kStep).force.allFinite());
+    EXPECT_NEAR(coupling.step(proxy, Pose(), kStep).force.z(), 2.0, 1e-9);
+    EXPECT_NEAR(coupling.step(proxy, Pose(), kStep).force.z(), 2.0, 1e-9);
+  }
+}
+
+//   the floor goes out of reach, and is there again after it has jumped
+TEST(LocalModel, ABodyThatComesBackWithANewEpochHasJumped) {
+  BallAboveFloor setup;
+  setup.receive(BallAboveFloor::at(0.012));
+  setup.step(BallAboveFloor::at(0.010));
+  HandManifold far = setup.server.manifold(++setup.tick, BallAboveFloor::at(0.012));
+  far.contacts.clear();
+  setup.model.receive(far);
+  setup.step(BallAboveFloor::at(0.010));
+  ASSERT_TRUE(setup.model.proxy().active);
+  ++setup.server.floor_epoch;
+  setup.server.lists_floor = true;
+  setup.receive(BallAboveFloor::at(0.012));
+  EXPECT_FALSE(setup.model.usable(setup.world));
+  setup.step(BallAboveFloor::at(0.010));
+  EXPECT_TRUE(setup.model.proxy().discontinuous);
+  EXPECT_TRUE(setup.model.usable(setup.world)) << "the planes are those after the jump";
 }
 
 TEST(LocalModel, LimitsTheStiffnessToThatOfTheDevice) {

@@ -44,7 +44,7 @@ class HandBesideAnother {
         hand(device_),
         server_(scene_, kWay, answers),
         kind_(kind) {
-    hand.setScene(scene_);
+    hand.setCopy(std::make_unique<SceneCopy>(scene_));
     hand.setForceModel(kind);
     if (answers.manifold_period > 1) hand.setLinkJitter(RateChooser::kSlowAnswers);
     hand.setLinkRoundTrip(2.0 * kWay * kTickSeconds);

@@ -282,19 +282,40 @@ TEST(SceneCopy, ACycleAllocatesNothingAndLocksNothing) {
   EXPECT_TRUE(far.copy.ready());
 }
 
-TEST(SwitchSlew, GoesFromOneForceToAnotherByTwoNewtonsAMillisecond) {
-  SwitchSlew slew;
-  const Wrench old{Vector3(6.0, 0.0, 0.0), Vector3::Zero()}, now{Vector3(0.0, 3.0, 0.0), Vector3::Zero()};
-  EXPECT_EQ(slew.step(old, 1e-3).force, old.force);
-  slew.begin();
-  Vector3 before = old.force;
-  int cycles = 0;
-  for (; cycles < 100 && before != now.force; ++cycles) {
-    const Vector3 force = slew.step(now, 1e-3).force;
-    ASSERT_LE((force - before).norm(), 2.0 + 1e-9);
-    before = force;
+class SwitchSlewTest : public testing::Test {
+ protected:
+  static Wrench ofForce(double x, double y) { return {Vector3(x, y, 0.0), Vector3::Zero()}; }
+  /// From one model to another: cycles until the force is the other one's.
+  int go(const Wrench& from, const Wrench& to) {
+    EXPECT_EQ(slew.step(from, kTickSeconds).force, from.force);
+    slew.begin();
+    int cycles = 0;
+    for (Vector3 before = from.force; cycles < 1000 && before != to.force; ++cycles) {
+      const Vector3 force = slew.step(to, kTickSeconds).force;
+      EXPECT_LE((force - before).norm(), 2.02 + 1e-9) << cycles;
+      EXPECT_LE(force.norm() - before.norm(), 0.02 + 1e-9) << cycles;
+      before = force;
+    }
+    return cycles;
   }
-  EXPECT_EQ(cycles, 4);  // 6.7 N
+  SwitchSlew slew{devices::SafetyLimits{.start_force_slew = 20.0, .start_torque_slew = 0.4}};
+};
+
+TEST_F(SwitchSlewTest, AForceFallsByTwoNewtonsAMillisecond) { EXPECT_NEAR(go(ofForce(6.0, 0.0), {}), 3, 1); }
+
+TEST_F(SwitchSlewTest, AForceGrowsByTwentyNewtonsASecond) {
+  EXPECT_NEAR(go(ofForce(2.0, 0.0), ofForce(7.0, 0.0)), 250, 1);
+}
+
+TEST_F(SwitchSlewTest, AForceThatTurnsLeavesAtOnceAndComesSlowly) {
+  EXPECT_NEAR(go(ofForce(6.0, 0.0), ofForce(0.0, 3.0)), 150, 1);
+}
+
+TEST_F(SwitchSlewTest, WhatTheNewModelNoLongerAsksForIsNotPushedBackward) {
+  static_cast<void>(slew.step({}, kTickSeconds));
+  slew.begin();
+  for (int i = 0; i < 50; ++i) static_cast<void>(slew.step(ofForce(10.0, 0.0), kTickSeconds));
+  EXPECT_EQ(slew.step({}, kTickSeconds).force, Vector3::Zero());
 }
 
 TEST(MotionLaw, KeepsTheTwistOfTheCentreAndEnds) {

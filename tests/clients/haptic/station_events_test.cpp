@@ -29,7 +29,7 @@ TEST(StationEvent, DescribesASafetyIntervention) {
 }
 
 TEST(StationEvent, EveryKindHasAText) {
-  for (int kind = 0; kind <= static_cast<int>(StationEventKind::kArmed); ++kind)
+  for (int kind = 0; kind <= static_cast<int>(StationEventKind::kContactsAgain); ++kind)
     EXPECT_THAT(describe({.kind = static_cast<StationEventKind>(kind), .detail = 1}, "left"),
                 testing::Not(HasSubstr("unknown event")))
         << kind;
@@ -84,6 +84,28 @@ TEST(RepeatedEvents, WhatIsNoWarningAlwaysPasses) {
        {StationEventKind::kStopChanged, StationEventKind::kArmed, StationEventKind::kDeviceFault,
         StationEventKind::kSafetyBegan, StationEventKind::kGuidanceEnded})
     for (int i = 0; i < 3; ++i) EXPECT_TRUE(events.passes({.seq = 1, .kind = kind}));
+}
+
+TEST(FarHands, ALinkIsToldAsTooLongOnceForAllHandsOfAStation) {
+  FarHands hands;
+  const auto passes = [&](StationEventKind kind, std::uint32_t hand) {
+    return hands.passes({.kind = kind, .hand = HandId{hand}});
+  };
+  EXPECT_FALSE(hands.any());
+  EXPECT_TRUE(passes(StationEventKind::kGuidanceAlone, 0));
+  EXPECT_FALSE(passes(StationEventKind::kGuidanceAlone, 1));
+  EXPECT_TRUE(passes(StationEventKind::kStale, 1));
+  EXPECT_FALSE(passes(StationEventKind::kContactsAgain, 0));
+  EXPECT_TRUE(hands.any());
+  EXPECT_TRUE(passes(StationEventKind::kContactsAgain, 1));
+  EXPECT_FALSE(hands.any());
+  EXPECT_TRUE(passes(StationEventKind::kGuidanceAlone, 1)) << "again";
+}
+
+TEST(StationEvent, SaysThatALinkIsTooLongForContactsAndHowLongItMayBe) {
+  EXPECT_EQ(
+      describe({.seq = 7, .kind = StationEventKind::kGuidanceAlone, .value = 165.2}, "left"),
+      "contacts are not felt over this link: 165 ms one way, 150 ms at most; guidance continues, step 7");
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ namespace tenon::haptic {
 namespace {
 
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -43,20 +44,23 @@ class Stranger {
 
 class StationStopsTest : public JoinedStation {
  protected:
-  void subscribe(bool reads_keys = false) {
+  void subscribe(const std::string& to_continue = "") {
     stops_ = std::make_unique<StationStops>(
         *link_,
         StationStops::Callbacks{.changed = [this](const StopSignal& signal) { heard_.push_back(signal); },
                                 .print = [this](const std::string& text) { printed_.push_back(text); }},
-        reads_keys);
+        to_continue);
     ASSERT_TRUE(stops_->subscribe());
   }
   [[nodiscard]] bool isStopped() const { return !heard_.empty() && heard_.back().engaged; }
-  void serverClears() {
+  void serverClears(const std::string& reason = kClear.reason, std::uint32_t counter = kClear.counter) {
     if (!clears_)
       clears_ = std::make_unique<wire::Writer<EmergencyClear>>(
           wire::Writer<EmergencyClear>::open(server_.session(), wire::kEmergencyClear).value());
-    ASSERT_TRUE(clears_->write(kClear));
+    EmergencyClear clear = kClear;
+    clear.reason = reason;
+    clear.counter = counter;
+    ASSERT_TRUE(clears_->write(clear));
   }
 
   std::unique_ptr<StationStops> stops_;
@@ -66,7 +70,7 @@ class StationStopsTest : public JoinedStation {
 };
 
 TEST_F(StationStopsTest, AnybodyStopsItAndItsServerAloneContinuesIt) {
-  subscribe(true);
+  subscribe("press the device's arming button to continue at this station");
   Stranger stranger;
   stranger.raise(kRaise);
   ASSERT_TRUE(hearUntil([&] { return isStopped(); }));
@@ -82,17 +86,29 @@ TEST_F(StationStopsTest, AnybodyStopsItAndItsServerAloneContinuesIt) {
   ASSERT_TRUE(hearUntil([&] { return !isStopped(); }));
   EXPECT_EQ(heard_.back().raised, 1U);
   EXPECT_THAT(printed_, Contains("emergency stop cleared by Bob: the finger is out"));
-  EXPECT_THAT(printed_, Contains("press return to continue at this station"));
+  EXPECT_THAT(printed_, Contains("press the device's arming button to continue at this station"));
 }
 
-TEST_F(StationStopsTest, SaysNothingOfKeysWhereItReadsNone) {
-  subscribe(false);
+TEST_F(StationStopsTest, SaysNoReasonWhereNoneWasGiven) {
+  subscribe();
+  Stranger stranger;
+  EmergencyStop raise = kRaise;
+  raise.reason.clear();
+  stranger.raise(raise);
+  ASSERT_TRUE(hearUntil([&] { return isStopped(); }));
+  serverClears("");
+  ASSERT_TRUE(hearUntil([&] { return !isStopped(); }));
+  EXPECT_THAT(printed_, ElementsAre("emergency stop by Eve", "emergency stop cleared by Bob"));
+}
+
+TEST_F(StationStopsTest, SaysNothingMoreWhereNobodyHasToPress) {
+  subscribe();
   Stranger stranger;
   stranger.raise(kRaise);
   ASSERT_TRUE(hearUntil([&] { return isStopped(); }));
   serverClears();
   ASSERT_TRUE(hearUntil([&] { return !isStopped(); }));
-  EXPECT_THAT(printed_, Not(Contains(HasSubstr("return"))));
+  EXPECT_THAT(printed_, Not(Contains(HasSubstr("to continue"))));
 }
 
 TEST_F(StationStopsTest, ARaiseIsToldOnceHoweverOftenItComes) {
@@ -108,16 +124,20 @@ TEST_F(StationStopsTest, ARaiseIsToldOnceHoweverOftenItComes) {
   EXPECT_EQ(heard_.size(), 2U);
 }
 
-TEST_F(StationStopsTest, AClearOfOneRaiseLeavesTheOther) {
+TEST_F(StationStopsTest, AClearLeavesLaterRaisesAndThoseOfOthers) {
   subscribe();
   Stranger stranger;
-  EmergencyStop second = kRaise;
+  EmergencyStop second = kRaise, other = kRaise;
   second.counter = 2;
-  stranger.raise(kRaise);
-  stranger.raise(second);
-  ASSERT_TRUE(hearUntil([&] { return isStopped() && heard_.back().raised == 2; }));
+  other.client_guid = "somebody else";
+  for (const EmergencyStop& raise : {kRaise, second, other}) stranger.raise(raise);
+  ASSERT_TRUE(hearUntil([&] { return isStopped() && heard_.back().raised == 3; }));
   serverClears();
-  ASSERT_TRUE(hearUntil([&] { return heard_.size() == 3; }));
+  hear();
+  EXPECT_TRUE(isStopped());
+  serverClears("the finger is out", 2);
+  hear();
+  EXPECT_EQ(heard_.size(), 4U) << "the second one is cleared";
   EXPECT_TRUE(isStopped());
 }
 

@@ -158,6 +158,51 @@ TEST_F(ReportTest, ARunWithASkippedStepDidNotSucceed) {
   EXPECT_EQ(outcomeOf(analysis), "not every step was done");
 }
 
+TEST_F(ReportTest, AStepWhoseEndIsNotRecordedIsWhatTheLogSaysOrNotKnown) {
+  const SessionAnalysis by_log = analyze({.leaves_no_end = true, .skip_is_in_the_log = true});
+  EXPECT_EQ(by_log.visits[0].phase, StepPhase::kSkipped);
+  EXPECT_EQ(resultOf(by_log.visits[0]), "skipped");
+  EXPECT_FALSE(by_log.succeeded());
+  const SessionAnalysis unknown = analyze({.leaves_no_end = true});
+  EXPECT_EQ(resultOf(unknown.visits[0]), "not known");
+  EXPECT_EQ(summaryJson(unknown)["steps"][0]["phase"], "not known");
+  EXPECT_FALSE(unknown.succeeded());
+  EXPECT_EQ(resultOf(unknown.visits[1]), "done");
+}
+
+TEST_F(ReportTest, FiguresOfStreamsThatAreMissingAreLeftBlankAndThatIsSaidAtTheTop) {
+  const SessionAnalysis whole = analyze();
+  EXPECT_TRUE(whole.missing.empty()) << whole.problem;
+  const SessionAnalysis analysis =
+      analyze({.lost = {"HandManifold", "ContactPairs_100", "WorldFrame_100", "StepProgress"},
+               .states_losses = true});
+  const std::string text = summaryText(analysis);
+  EXPECT_THAT(text.substr(0, text.find("\n\n")), HasSubstr("samples are missing: "));
+  for (const char* const count :
+       {"7900 of 8000 of TickInput", "200 of 800 of WorldFrame_100", "of HandManifold"})
+    EXPECT_THAT(analysis.problem, HasSubstr(count));
+  EXPECT_THAT(analysis.problem, Not(HasSubstr("GrabState"))) << "all of them are there";
+  const nlohmann::json summary = nlohmann::json::parse(summaryJson(analysis).dump());
+  for (const char* const figure : {"peak_force", "mean_force", "contact_seconds", "path", "collisions",
+                                   "position_error", "angle_error", "device_proxy_gap", "field_depth"}) {
+    EXPECT_TRUE(summary["steps"][1][figure].is_null()) << figure;
+    EXPECT_FALSE(summary["steps"][2][figure].is_null()) << figure;
+  }
+  EXPECT_EQ(errorText(analysis.visits[1]), "");
+  EXPECT_TRUE(summary["whole"]["peak_force"].is_null());
+  EXPECT_FALSE(summary["steps"][1]["load_percent"].is_null()) << "that is of another stream";
+}
+
+// of them nobody counts how many there were
+TEST_F(ReportTest, ForcesThatStationsDidNotStateAreLeftBlank) {
+  const nlohmann::json summary =
+      nlohmann::json::parse(summaryJson(analyze({.lost = {"HandState_100"}})).dump());
+  EXPECT_TRUE(summary["steps"][1]["peak_force"].is_null());
+  EXPECT_TRUE(summary["steps"][1]["mean_force"].is_null());
+  EXPECT_FALSE(summary["steps"][0]["peak_force"].is_null());
+  EXPECT_FALSE(summary["steps"][1]["path"].is_null());
+}
+
 TEST_F(ReportTest, ATruncatedRecordingIsAnalysedAsFarAsItGoes) {
   analyze();
   std::filesystem::resize_file(file_, std::filesystem::file_size(file_) * 2 / 3);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <random>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,7 +33,11 @@ struct SyntheticSession {
   bool pauses = false;         ///< for the second quarter of the second step
   std::uint32_t steps = 4;
   Tick ticks_per_step = 2000;
-  double peak_force = 18.0;       ///< [N] in the last step, for one tick
+  double peak_force = 18.0;    ///< [N] in the last step, for one tick
+  bool leaves_no_end = false;  ///< of the first step: it was skipped, and neither message nor event say so
+  bool skip_is_in_the_log = false;          ///< with leaves_no_end: the event does
+  std::set<std::string, std::less<>> lost;  ///< topics of which the second step has no samples
+  bool states_losses = false;               ///< the recorder has ended and written its own counts
   bool arrives_by_topic = false;  ///< topics reach the recorder one after the other, not tick by tick
 };
 
@@ -76,6 +81,9 @@ class SyntheticRecording {
       std::stable_sort(sent_.begin(), sent_.end(),
                        [](const Sent& a, const Sent& b) { return a.topic > b.topic; });
     for (const Sent& sent : sent_) write(sent);
+    if (parameters_.states_losses)
+      static_cast<void>(
+          writer_.addMetadata("tenon samples", {{"TickInput", "100 of 8000"}, {"GrabState", "3 of 3"}}));
     static_cast<void>(writer_.close());
   }
 
@@ -89,6 +97,10 @@ class SyntheticRecording {
 
   template <class M>
   void put(const wire::Topic<M>& topic, const M& message) {
+    if (topic.parameters.of_server || topic.qos_class == wire::QosClass::kStream)
+      ++published_[std::string(topic.name)];
+    const Tick step = tick_ == 0 ? 0 : (tick_ - 1) / parameters_.ticks_per_step;
+    if (step == 1 && parameters_.lost.contains(topic.name)) return;
     sent_.push_back({topic.name, wire::typeName<M>(), tick_, *wire::encode(message)});
   }
   void write(const Sent& sent) {
@@ -121,6 +133,7 @@ class SyntheticRecording {
     if (tick_ % 10 == 0) addFrame(wire::kWorldFrame100, step, in_step);
     if (tick_ % 33 == 0) addFrame(wire::kWorldFrame30, step, in_step);
     if (tick_ % 10 == 0) addStats(pressed);
+    if (tick_ % kPublishedSamplesPeriod == 0) statePublished();
     if (tick_ % 33 == 0)
       put(wire::kStepProgress, StepProgress{.revision = step + 1,
                                             .tick = tick_,
@@ -128,7 +141,22 @@ class SyntheticRecording {
                                             .contact_seconds = 1e-3 * pressed * 1000.0});
   }
 
+  void statePublished() {
+    PublishedSamples published{tick_ + 1 - kPublishedSamplesPeriod, tick_, {}};
+    for (const auto topic : {wire::kWorldFrame100.name, wire::kContactPairs100.name, wire::kTickStats100.name,
+                             wire::kHandManifold.name})
+      published.topics.push_back({std::string(topic), published_[std::string(topic)]});
+    published_.clear();
+    put(wire::kPublishedSamples, published);
+  }
+
   void beginStep(std::uint32_t step) {
+    if (step > 0 && !parameters_.leaves_a_step && !(parameters_.skips_a_step && step == 1) &&
+        !(parameters_.leaves_no_end && step == 1))
+      put(wire::kEventLog, EventLog{40 + step, tick_, Severity::kInfo, "step done",
+                                    "step_" + std::to_string(step - 1) + " (2.0 s)"});
+    if (parameters_.skip_is_in_the_log && step == 1)
+      put(wire::kEventLog, EventLog{50, tick_, Severity::kInfo, "step skipped", "step_0 (2.0 s)"});
     if (parameters_.skips_a_step && step == 1) put(wire::kStepState, stepState(0, StepPhase::kSkipped));
     put(wire::kStepState, stepState(step, StepPhase::kActive));
     if (parameters_.leaves_a_step && step > 0 && step != 2)
@@ -224,7 +252,8 @@ class SyntheticRecording {
   record::McapWriter writer_;
   std::map<std::string_view, std::uint16_t> channels_;
   std::vector<Sent> sent_;
-  std::map<HandId, float> peaks_;  ///< [N] displayed since the last HandState
+  std::map<std::string, std::uint64_t> published_;  ///< since the last statement
+  std::map<HandId, float> peaks_;                   ///< [N] displayed since the last HandState
   Tick tick_ = 0;
   std::mt19937_64 random_{5};
 };

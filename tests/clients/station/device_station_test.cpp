@@ -1,5 +1,6 @@
 #include "clients/station/device_station.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <memory>
@@ -8,7 +9,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "clients/haptic/scene_copy.h"
+#include "clients/haptic/servo_thread.h"
+#include "devices/safety_rules.h"
 #include "devices/simulated/sigma7.h"
+#include "tests/server/simulation/small_scene.h"
 
 namespace tenon::station {
 namespace {
@@ -108,8 +113,27 @@ TEST(DeviceStation, TellsWhatMovesEachHandAndHowFarItReaches) {
   for (const haptic::HandDevice& device :
        (*DeviceStation::open(defaultStation(Role::kTrainee)))->handDevices())
     told.push_back(describe(device));
-  EXPECT_THAT(told, ElementsAre("hand right: HUG arm (simulated), workspace radius 0.400 m",
-                                "hand left: HUG arm (simulated), workspace radius 0.400 m"));
+  EXPECT_THAT(told,
+              ElementsAre("hand right: HUG arm (simulated), serial number 1001, workspace radius 0.400 m",
+                          "hand left: HUG arm (simulated), serial number 1001, workspace radius 0.400 m"));
+}
+
+TEST(DeviceStation, TwoDevicesOfAKindAreTwo) {
+  const auto serials = [](const StationOptions& options) {
+    std::vector<std::string> all;
+    const auto station = DeviceStation::open(options);
+    if (!station) return std::vector<std::string>{station.error().what};
+    for (const haptic::HandDevice& device : (*station)->handDevices()) all.push_back(device.serial);
+    return all;
+  };
+  StationOptions options = withDevices({"sigma7-sim", "sigma7-sim"}, PersonKind::kNone);
+  EXPECT_THAT(serials(options), ElementsAre("1001", "1002"));
+  options.devices[1].configuration.serial = "1001";
+  EXPECT_THAT(serials(options), ElementsAre("1002", "1001"));
+  options.devices[0].configuration.serial = "1001";
+  EXPECT_THAT(serials(options), ElementsAre("device 'sigma7-sim' with serial number 1001 is given twice"));
+  options.devices[0].configuration.serial = "7";
+  EXPECT_THAT(serials(options), ElementsAre(HasSubstr("none with serial number '7' is there")));
 }
 
 TEST(DeviceStation, RefusesHandsThatDoNotFitItsArms) {
@@ -131,6 +155,18 @@ TEST(DeviceStation, WithoutAPersonNothingMovesItAndNothingArmsIt) {
   scene.station->press();
   scene.run(0.01);
   EXPECT_TRUE(scene.hand().active);
+}
+
+TEST(DeviceStation, AHandThatBeginsUnderAStopSaysStopAndOneThatIsNotArmedSaysThat) {
+  constexpr std::uint32_t kStopped = devices::bit(devices::SafetyRule::kEmergencyStop);
+  constexpr std::uint32_t kNotArmed = devices::bit(devices::SafetyRule::kNotArmed);
+  EmptyScene scene(withDevices({"sigma7-sim"}, PersonKind::kNone));
+  scene.run(0.01);
+  EXPECT_EQ(scene.station->states()[0].safety_flags & (kStopped | kNotArmed), kNotArmed);
+  scene.station->receive(haptic::StopSignal{.raised = 1, .engaged = true});
+  scene.rejoin({HandId{0}, HandId{1}, HandId{2}});
+  scene.run(0.01);
+  EXPECT_EQ(scene.station->states()[0].safety_flags & (kStopped | kNotArmed), kStopped);
 }
 
 TEST(DeviceStation, ManifoldsOfOtherStationsAreNotItsOwn) {
@@ -207,6 +243,7 @@ class DeviceWithButton final : public devices::HapticDevice {
   [[nodiscard]] Result<void> resetFault() override { return {}; }
   void read(devices::DeviceState& state) noexcept override {
     state = {};
+    state.seq = ++readings_;
     state.buttons = pressed ? 1 : 0;
     state.forces_on = armed;
   }
@@ -217,6 +254,7 @@ class DeviceWithButton final : public devices::HapticDevice {
   devices::DeviceCommand last;
 
  private:
+  std::uint64_t readings_ = 0;
   devices::DeviceCaps caps_;
 };
 
@@ -226,9 +264,93 @@ StationOptions withButton(const std::shared_ptr<DeviceWithButton>& device) {
   return options;
 }
 
+/// A device that says when it was waited for.
+class PacingDevice final : public devices::HapticDevice {
+ public:
+  [[nodiscard]] const devices::DeviceCaps& caps() const override { return caps_; }
+  [[nodiscard]] Result<void> arm() override { return {}; }
+  void disarm() noexcept override {}
+  [[nodiscard]] Result<void> resetFault() override { return {}; }
+  [[nodiscard]] bool paces() const noexcept override { return true; }
+  [[nodiscard]] bool awaitReading(std::chrono::nanoseconds) noexcept override {
+    ++awaited;
+    return true;
+  }
+  void read(devices::DeviceState& state) noexcept override {
+    state = {};
+    state.seq = ++read_;
+    state.forces_on = true;
+  }
+  void write(const devices::DeviceCommand&) noexcept override {}
+
+  int awaited = 0;
+
+ private:
+  std::uint64_t read_ = 0;
+  devices::DeviceCaps caps_ = devices::sigma7Model().caps;
+};
+
+TEST(DeviceStation, IsPacedByTheFirstDeviceThatDoes) {
+  EXPECT_EQ((*DeviceStation::open(withDevices({"sigma7-sim"}, PersonKind::kNone)))->pacedBy(), "");
+  const auto first = std::make_shared<PacingDevice>(), second = std::make_shared<PacingDevice>();
+  StationOptions options = withDevices({"sigma7-sim", "one", "other"}, PersonKind::kNone);
+  options.hands = {"left", "right", "third"};
+  options.tracker.clear();
+  options.devices[1].opened = first;
+  options.devices[2].opened = second;
+  EmptyScene scene(options);
+  EXPECT_EQ(scene.station->pacedBy(), "the device of hand right");
+  EXPECT_TRUE(scene.station->awaitReading(std::chrono::milliseconds(3)));
+  EXPECT_EQ(first->awaited, 1);
+  EXPECT_EQ(second->awaited, 0) << "it follows";
+  scene.rejoin({HandId{0}, HandId{}, HandId{2}});
+  EXPECT_FALSE(scene.station->awaitReading(std::chrono::milliseconds(3))) << "nobody reads it";
+  EXPECT_EQ(first->awaited, 1);
+}
+
+TEST(DeviceStation, ItsLoopRunsByTheClockOfASimulatedDevice) {
+  StationOptions options = defaultStation(Role::kTrainee);
+  options.devices.front().configuration.paces = true;
+  EmptyScene scene(options);
+  ASSERT_TRUE(scene.station->armDevices());
+  EXPECT_EQ(scene.station->pacedBy(), "the device of hand right");
+  haptic::ServoThread servo(
+      *scene.station, [] {}, false);
+  servo.start();
+  std::uint32_t seq = 0;
+  while (seq < 200) {
+    const haptic::StationOutput* const output = servo.loop().takeOutput();
+    if (output == nullptr) {
+      std::this_thread::yield();
+      continue;
+    }
+    EXPECT_GT(output->seq, seq);
+    seq = output->seq;
+    EXPECT_EQ(output->inputs.size(), 4U) << "both arms, forearm and head";
+  }
+  servo.stop(true);
+  EXPECT_TRUE(scene.station->finished());
+}
+
+// arming has another thread, and no two use a device
+TEST(DeviceStation, ADeviceThatIsBeingArmedIsNotWaitedFor) {
+  const auto device = std::make_shared<PacingDevice>();
+  StationOptions options = withDevices({"one"}, PersonKind::kNone);
+  options.devices.front().opened = device;
+  EmptyScene scene(options);
+  scene.run(0.001);
+  scene.station->press();
+  ASSERT_TRUE(scene.station->wantsArming());
+  EXPECT_FALSE(scene.station->awaitReading(std::chrono::milliseconds(3)));
+  EXPECT_EQ(device->awaited, 0);
+  ASSERT_TRUE(scene.station->armDevices());
+  EXPECT_TRUE(scene.station->awaitReading(std::chrono::milliseconds(3)));
+}
+
 TEST(DeviceStation, AButtonThatIsHeldOverARejoinIsNotPressed) {
   const auto device = std::make_shared<DeviceWithButton>();
   EmptyScene scene(withButton(device));
+  EXPECT_TRUE(scene.station->hasArmingButton());
   scene.station->receive(haptic::StopSignal{1, true});
   device->pressed = true;
   scene.rejoin({HandId{0}, HandId{1}, HandId{2}});
@@ -239,6 +361,82 @@ TEST(DeviceStation, AButtonThatIsHeldOverARejoinIsNotPressed) {
   device->pressed = true;
   scene.run(0.01);
   EXPECT_FALSE(scene.station->arming().awaitsPress());
+}
+
+/// A device at rest far beyond its workspace, whose wall asks for 3 N where no contacts are rendered; its
+/// motors can do that for a while.
+class DeviceInItsWall final : public devices::HapticDevice {
+ public:
+  DeviceInItsWall() { caps_.continuous_force = 1.0; }
+  [[nodiscard]] const devices::DeviceCaps& caps() const override { return caps_; }
+  [[nodiscard]] Result<void> arm() override {
+    armed_ = true;
+    return {};
+  }
+  void disarm() noexcept override { armed_ = false; }
+  [[nodiscard]] Result<void> resetFault() override { return {}; }
+  void read(devices::DeviceState& state) noexcept override {
+    state = {};
+    state.seq = ++readings_;
+    state.X_DH = Pose(Vector3(4.0 * caps_.workspace_radius, 0.0, 0.0));
+    state.forces_on = armed_;
+  }
+  void write(const devices::DeviceCommand& command) noexcept override {
+    largest = std::max(largest, command.F_Ho_D.force.norm());
+    last = command.F_Ho_D.force.norm();
+  }
+
+  double largest = 0.0, last = 0.0;  // [N]
+
+ private:
+  std::uint64_t readings_ = 0;
+  devices::DeviceCaps caps_ = devices::sigma7Model().caps;
+  bool armed_ = false;
+};
+
+TEST(DeviceStation, MotorsThatAreHotAreSoForTheNextSeat) {
+  const auto device = std::make_shared<DeviceInItsWall>();
+  StationOptions options = withDevices({"sigma7"}, PersonKind::kNone);
+  options.devices.front().opened = device;
+  EmptyScene scene(options);
+  scene.station->press();
+  scene.run(20.0);
+  EXPECT_NEAR(device->largest, 3.0, 0.1);
+  const double hot = device->caps().continuous_force + 0.2;
+  ASSERT_LT(device->last, hot);
+  device->largest = 0.0;
+  scene.rejoin({HandId{0}, HandId{1}, HandId{2}});
+  scene.run(4.0);
+  EXPECT_LT(device->largest, 2.0) << "not 3 N: the ramp of a second cools it a little";
+  EXPECT_GT(device->last, 0.5 * hot) << "it is armed";
+}
+
+// who has the devices gives copies when they are made; a restart makes none
+TEST(DeviceStation, CopiesOfTheSceneAreMadeByWhoGivesThemAlone) {
+  test::SmallScene small;
+  small.hand("right", small.object("ball", test::pointerShape(), Vector3::Zero()));
+  const auto model = small.build();
+  const long nobodys = model.use_count();
+  const long one = [&] {
+    const auto copies = haptic::copiesOf(model, 1);
+    return model.use_count() - nobodys;
+  }();
+  EmptyScene scene(withDevices({"sigma7-sim"}, PersonKind::kNone));
+  const auto copies = [&] { return (model.use_count() - nobodys) / one; };
+  const std::vector<HandId> hands{HandId{0}, HandId{1}, HandId{2}};
+  scene.station->setCopies(haptic::copiesOf(model, 1));
+  EXPECT_EQ(copies(), 1);
+  scene.run(0.01);
+  scene.rejoin(hands);
+  EXPECT_EQ(copies(), 0) << "it went with its hand";
+  scene.station->setCopies(haptic::copiesOf(model, 1));
+  scene.run(0.01);
+  EXPECT_EQ(copies(), 1);
+  // a second one waits for the next hand
+  scene.station->setCopies(haptic::copiesOf(model, 1));
+  EXPECT_EQ(copies(), 2);
+  scene.rejoin(hands);
+  EXPECT_EQ(copies(), 1);
 }
 
 TEST(DeviceStation, AtItsEndAllDevicesAreDisarmedWithTheBracelet) {

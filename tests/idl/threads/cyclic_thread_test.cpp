@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "idl/threads/virtual_clock.h"
+
 namespace tenon::threads {
 namespace {
 

@@ -151,11 +151,25 @@ TEST_F(EndpointTest, AMissingConfigurationFileIsAnErrorThatNamesIt) {
   EXPECT_EQ(opened.error().what, "no/such/file.xml: there is no such DDS configuration file");
 }
 
-TEST_F(EndpointTest, AWrongConfigurationIsAnError) {
-  const auto opened =
-      Participant::open({.domain = 8, .config = "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>"});
+const std::string kWrongConfig = "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>";
+
+TEST(ParticipantTest, AWrongConfigurationIsAnError) {
+  const std::uint32_t domain = test::ownDomain();
+  const auto opened = Participant::open({.domain = domain, .config = kWrongConfig});
   ASSERT_FALSE(opened);
-  EXPECT_TRUE(opened.error().what.starts_with("DDS domain 8 could not be opened: ")) << opened.error().what;
+  EXPECT_TRUE(
+      opened.error().what.starts_with("DDS domain " + std::to_string(domain) + " could not be opened: "))
+      << opened.error().what;
+  EXPECT_NE(opened.error().what.find("Nonsense"), std::string::npos) << opened.error().what;
+}
+
+// DDS reads the configuration of a domain with the process's first participant there, and no later one
+TEST_F(EndpointTest, AnotherConfigurationOfADomainThatIsOpenIsAnError) {
+  const auto opened = Participant::open({.domain = test::ownDomain(), .config = kWrongConfig});
+  ASSERT_FALSE(opened);
+  EXPECT_NE(opened.error().what.find("this process has it open with another configuration"),
+            std::string::npos)
+      << opened.error().what;
 }
 
 TEST_F(EndpointTest, ATextThatIsTooLongIsNotWritten) {

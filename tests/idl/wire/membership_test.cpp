@@ -214,6 +214,7 @@ TEST(Membership, AKilledServerIsReportedAsGoneAndAMissingOneAsNotAnnounced) {
   const auto found = Membership::find(missing, stop);
   ASSERT_FALSE(found);
   EXPECT_THAT(found.error().what, HasSubstr("no server announced session 'nowhere'"));
+  EXPECT_THAT(found.error().what, HasSubstr("on the network 'loopback'"));
   EXPECT_THAT(found.error().what, HasSubstr("tenon serve"));
 }
 

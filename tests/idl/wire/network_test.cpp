@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -45,6 +46,22 @@ TEST(FindNetwork, RefusesWhatIsNoNetworkAndSaysWhatIs) {
   ASSERT_FALSE(unknown);
   EXPECT_THAT(unknown.error().what, HasSubstr("'no-such-host.invalid' has no IPv4 address"));
   EXPECT_FALSE(findNetwork(""));
+}
+
+TEST(FindNetwork, RefusesPeersThatAreNoOtherMachine) {
+  for (const auto& [text, why] : {std::pair("wan,127.0.0.1", "'127.0.0.1' means loopback (127.0.0.1)"),
+                                  std::pair("lan,localhost", "'localhost' means loopback (127."),
+                                  std::pair("wan,127.0.1.1", "--network loopback"),
+                                  std::pair("wan,10.1", "'10.1' is no IPv4 address: four numbers"),
+                                  std::pair("wan,10.0.0.256", "'10.0.0.256' is no IPv4 address"),
+                                  std::pair("wan,224.0.0.1", "multicast"),
+                                  std::pair("wan,0.0.0.0", "'0.0.0.0' is no address of a machine"),
+                                  std::pair("lan,255.255.255.255", "is no address of a machine")}) {
+    const auto network = findNetwork(text);
+    ASSERT_FALSE(network) << text;
+    EXPECT_THAT(network.error().what, HasSubstr(std::string("network '") + text + "': the peer "));
+    EXPECT_THAT(network.error().what, HasSubstr(why));
+  }
 }
 
 TEST(NetworkConfig, NamesInterfaceAndPeers) {
@@ -99,6 +116,31 @@ TEST(ChosenNetwork, IsThatOfTheEnvironmentElseLoopback) {
   const ScopedVariable uri("CYCLONEDDS_URI", "file:///none.xml");
   EXPECT_EQ(chosenNetwork()->reach, Reach::kConfig);
   EXPECT_THAT(audienceOf(*chosenNetwork()), HasSubstr("file:///none.xml"));
+}
+
+TEST(CheckAgainstUri, RefusesTheInterfaceOfLoopbackForANetworkBeyondIt) {
+  const Network wan{Reach::kWan, "wan", "eth0", "10.0.0.5/24", {}};
+  const auto isRefused = [](const Network& network, const std::string& interfaces) {
+    const std::string text =
+        "<CycloneDDS><Domain><General>" + interfaces + "</General></Domain></CycloneDDS>";
+    const ScopedVariable uri("CYCLONEDDS_URI", text.c_str());
+    return !checkAgainstUri(network);
+  };
+  const std::string loopback = "<Interfaces><NetworkInterface name=\"lo\"/></Interfaces>";
+  EXPECT_TRUE(isRefused(wan, loopback));
+  EXPECT_TRUE(
+      isRefused(wan, "<Interfaces><NetworkInterface priority='1' address='127.0.0.1'/></Interfaces>"));
+  EXPECT_TRUE(isRefused(wan, "<NetworkInterfaceAddress>lo</NetworkInterfaceAddress>"));
+  EXPECT_FALSE(isRefused(wan, "<Interfaces><NetworkInterface name=\"lowpan0\"/></Interfaces>"));
+  EXPECT_FALSE(isRefused({Reach::kLoopback, "loopback", "lo", "127.0.0.1/8", {}}, loopback));
+  EXPECT_TRUE(checkAgainstUri(wan)) << "without the variable";
+}
+
+TEST(Participant, ThatCannotBeOpenedNamesTheVariableThatMayBeWhy) {
+  const ScopedVariable uri("CYCLONEDDS_URI", "garbage");
+  const auto participant = Participant::open({.domain = 213});
+  ASSERT_FALSE(participant);
+  EXPECT_THAT(participant.error().what, HasSubstr("could not be opened by CYCLONEDDS_URI, 'garbage'"));
 }
 
 }  // namespace

@@ -23,6 +23,7 @@ namespace {
 
 const std::string kStream = "best effort, last 1, volatile";
 const std::string kLast16 = "best effort, last 16, volatile";  // what the reader keeps
+const std::string kLast32 = "best effort, last 32, volatile";
 const std::string kLockstepStream = "reliable, last 32, volatile";
 const std::string kLockstepFrames = "reliable, last 32, transient local";  // streams of a server
 const std::string kState = "reliable, last 1, transient local";
@@ -49,8 +50,8 @@ const std::vector<Row> kRows{
     {"WorldFrame_1k", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
     {"WorldFrame_100", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
     {"WorldFrame_30", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
-    {"HandManifold", kStream, kLockstepFrames, kLease1 + ", deadline 100 ms", kLockstepLease + ", joiners 1"},
-    {"HandManifold_50", kStream, kLockstepFrames, kLease1 + ", deadline 100 ms",
+    {"HandManifold", kLast32, kLockstepFrames, kLease1 + ", deadline 100 ms", kLockstepLease + ", joiners 1"},
+    {"HandManifold_50", kLast32, kLockstepFrames, kLease1 + ", deadline 100 ms",
      kLockstepLease + ", joiners 1"},
     {"HandState_100", kStream, kLockstepStream, kLease1, kLockstepLease},
     {"ContactPairs_100", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
@@ -63,6 +64,8 @@ const std::vector<Row> kRows{
     {"SceneObject", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"SceneHand", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"SceneStep", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
+    {"SceneTitle", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
+    {"SceneSignal", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"ObjectSnapshot", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"StepState", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"StepProgress", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
@@ -199,9 +202,9 @@ TEST_F(ProfilesTest, EntitiesOfEveryTopicHaveThePoliciesOfItsClassOnBothLinks) {
       if (row.topic != topic.name) continue;
       const bool is_state =
           topic.qos_class == QosClass::kState;  // of those with several writers, readers keep all
-      EXPECT_EQ(writerOn(lan_, topic), (is_state                ? kState
-                                        : row.reader == kLast16 ? kStream
-                                                                : row.reader) +
+      EXPECT_EQ(writerOn(lan_, topic), (is_state                                         ? kState
+                                        : row.reader == kLast16 || row.reader == kLast32 ? kStream
+                                                                                         : row.reader) +
                                            row.offered)
           << topic.name;
       EXPECT_EQ(readerOn(lan_, topic, false), row.reader) << topic.name;
@@ -237,6 +240,25 @@ TEST_F(ProfilesTest, WritersUseXcdr1AndWaitLongerForASlowReaderInLockstep) {
       dds_free(values);
     }
   }
+}
+
+// Join and Command are written by threads that wait for the answer, all others where stops are heard as well.
+TEST_F(ProfilesTest, NoWriteButARequestWaitsLongForASlowReader) {
+  for (const TopicSpec& topic : topics()) {
+    const auto writer = openWriter(lan_, topic);
+    ASSERT_TRUE(writer) << topic.name;
+    const bool is_request = topic.name == std::string("Join") || topic.name == std::string("Command");
+    EXPECT_EQ(inMilliseconds(blockingTime(effectiveQos((*writer)->entity()).get())),
+              is_request ? "500 ms" : "5 ms")
+        << topic.name;
+  }
+  // whatever else a topic has: its own parameter alone says so
+  TopicSpec other{wire::kCommand.name, &TypeOf<Command>::descriptor(), wire::kCommand.qos_class,
+                  wire::kCommand.parameters};
+  other.parameters.request = false;
+  const auto writer = openWriter(lan_, other);
+  ASSERT_TRUE(writer);
+  EXPECT_EQ(inMilliseconds(blockingTime(effectiveQos((*writer)->entity()).get())), "5 ms");
 }
 
 // ---- what follows from some of them

@@ -357,7 +357,13 @@ TEST(StateMachine, ProgressTellsTheConditionTree) {
       "fulfilled}\n";
   test::ScenarioFixture fixture(
       test::with(test::smallScenario(), "    touch: part\n    for: 0.1 s\n", conditions));
-  EXPECT_EQ(progress(fixture.scenario(), fixture.status(), 0).nodes, 6U) << "told from the start of the step";
+  const StepProgress before = progress(fixture.scenario(), fixture.status(), 0);
+  EXPECT_EQ(before.nodes, 6U) << "told from the start of the step";
+  fixture.step();
+  const StepProgress evaluated = progress(fixture.scenario(), fixture.status(), 1);
+  for (std::size_t i = 0; i < before.conditions.size(); ++i)
+    EXPECT_FLOAT_EQ(before.conditions[i].limit, evaluated.conditions[i].limit)
+        << before.conditions[i].text << ": its limit is known before it is evaluated, as under a stop";
   fixture.step({command(CommandKind::kFulfilled)});
   const StepProgress report = progress(fixture.scenario(), fixture.status(), 1);
   struct Row {

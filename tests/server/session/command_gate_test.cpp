@@ -30,7 +30,7 @@ TEST(CommandGateTest, ACommandIsPossibleByThePhaseOfTheRun) {
       {CommandKind::kSkipStep, kWaiting, kNone, kNone, kOver},
       {CommandKind::kPause, kWaiting, kNone, kAlready, kOver},
       {CommandKind::kResume, kWaiting, kAlready, kNone, kOver},
-      {CommandKind::kRelease, kNone, kNone, kNone, kOver},
+      {CommandKind::kRelease, kWaiting, kNone, kNone, kOver},
       {CommandKind::kSetCollision, kNone, kNone, kNone, kOver},
       {CommandKind::kFreezeForces, kWaiting, kNone, kNone, kOver},
       {CommandKind::kClearEmergencyStop, kNone, kNone, kNone, kOver},

@@ -102,6 +102,23 @@ TEST(InputBuffer, ChangesOfThePlayoutTakeNothingTwice) {
   EXPECT_GE(last, 298U);
 }
 
+TEST(InputBuffer, AReadingOfTheFormerStationIsNotTheFirstOfTheNextOne) {
+  for (const std::uint32_t playout : {0U, 2U}) {
+    InputBuffer buffer(1);
+    buffer.setPlayout(kOnlyHand, playout);
+    TickInput input;
+    for (std::uint32_t seq = 70; seq < 75; ++seq) buffer.put({.hand = kOnlyHand, .seq = seq});
+    buffer.restart(kOnlyHand);
+    buffer.setPlayout(kOnlyHand, playout);
+    buffer.collect(1, input);
+    EXPECT_TRUE(input.readings.empty()) << "it came before the seat was taken over";
+    buffer.put({.hand = kOnlyHand, .seq = 1});
+    buffer.collect(2, input);
+    ASSERT_EQ(input.readings.size(), 1U);
+    EXPECT_EQ(input.readings[0].seq, 1U);
+  }
+}
+
 TEST(InputBuffer, CollectsWithoutAllocatingOrLocking) {
   InputBuffer buffer(1);
   buffer.setPlayout(kOnlyHand, 2);

@@ -4,15 +4,20 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <future>
+#include <string>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "idl/threads/scheduling.h"
 #include "server/session/contributions.h"
+#include "tests/server/session/hanging_disk.h"
 #include "tests/server/session/small_session.h"
 
 namespace tenon::session {
@@ -62,16 +67,42 @@ TEST_F(JournalWriterTest, AReaderThatHangsLeavesNoGapInTheFile) {
   for (int i = 0; i < 600 && writer.lostCopies() < 1000; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   continues.set_value();
+  writer.end(
+      {.phase = simulation_.phase(), .tick = 5200, .reason = "done", .final_hash = simulation_.hash()});
   writer.stop();
   EXPECT_EQ(writer.lostEntries(), 0U);
   EXPECT_GT(writer.lostCopies(), 0U) << "the queue of copies is bounded";
   EXPECT_EQ(writer.lostCopies() + copies, 5200U);
-  ASSERT_TRUE(writer.close({.phase = simulation_.phase(), .tick = 5200, .reason = "done"}));
+  ASSERT_FALSE(writer.problem()) << *writer.problem();
   SessionSimulation again = test::SessionRig::makeSimulation(loaded_);
   const auto report = resimulate(file_, again);
   ASSERT_TRUE(report) << report.error().what;
   EXPECT_EQ(report->compared, 5199U);
   EXPECT_TRUE(report->gaps.empty());
+  EXPECT_FALSE(report->has_no_end);
+}
+
+/// [-] of the thread of this process with this name; -1: there is none.
+int policyOf(const std::string& name) {
+  for (const auto& task : fs::directory_iterator("/proc/self/task")) {
+    std::string found;
+    std::getline(std::ifstream(task.path() / "comm"), found);
+    if (found == name) return sched_getscheduler(std::stoi(task.path().filename())) & ~SCHED_RESET_ON_FORK;
+  }
+  return -1;
+}
+
+// at high load ticks go on, and their entries would wait until the queue is full
+TEST_F(JournalWriterTest, TheFilesThreadHasRealTimePriorityWhereItIsPermitted) {
+  std::string refused;
+  std::thread([&] { refused = threads::raiseThisThread(1); }).join();
+  if (!refused.empty()) GTEST_SKIP() << refused;
+  JournalWriter writer(openJournal(), [](const JournalEntry&) {});
+  writer.start();
+  for (int tries = 0; tries < 500 && policyOf("journal") != SCHED_FIFO; ++tries)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(policyOf("journal"), SCHED_FIFO);
+  writer.stop();
 }
 
 TEST_F(JournalWriterTest, ACopyIsGivenAwayOnlyOnceItsEntryOutlivesTheProcess) {
@@ -104,14 +135,32 @@ TEST_F(JournalWriterTest, AFullDiskEndsTheFileAndNotTheCopies) {
   setrlimit(RLIMIT_FSIZE, &small);
   writer.start();
   play(writer, 1000);
+  writer.end({.phase = simulation_.phase(), .tick = 1000, .reason = "done"});
+  EXPECT_TRUE(writer.isEndedWithin(std::chrono::minutes(1)));
   writer.stop();
-  const auto closed = writer.close({.phase = simulation_.phase(), .tick = 1000, .reason = "done"});
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   ASSERT_TRUE(writer.problem());
   EXPECT_THAT(*writer.problem(), testing::HasSubstr("session.mcap: cannot write"));
-  EXPECT_FALSE(closed);
   EXPECT_EQ(copies, 1000U);
+}
+
+// All ticks are written, and the disk hangs with the end of the file alone.
+TEST_F(JournalWriterTest, AnEndThatTheDiskDoesNotTakeIsWaitedForAsTicksAre) {
+  for (const bool has_thread : {true, false}) {
+    JournalWriter writer(openJournal(), {});
+    if (has_thread) writer.start();
+    play(writer, 5);
+    if (!has_thread) writer.writeNow();
+    while (writer.waitingEntries() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // up to the end of its pass
+    test::HangingDisk disk(file_);
+    writer.end({.phase = simulation_.phase(), .tick = simulation_.now(), .reason = "done"});
+    EXPECT_FALSE(writer.isEndedWithin(std::chrono::milliseconds(300)));
+    EXPECT_EQ(writer.waitingEntries(), 0U);
+    disk.release();
+    EXPECT_TRUE(writer.isEndedWithin(std::chrono::minutes(1)));
+  }
 }
 
 TEST(Contributions, OfEachClientAFewWaitAndTheNewestOfEachSource) {

@@ -224,6 +224,30 @@ TEST_F(RegistryCommands, AClientReleasesAndSwapsOnlyHandsItControls) {
   EXPECT_TRUE(command(both, CommandKind::kSwapHands).accepted);
 }
 
+TEST_F(RegistryCommands, WhereNothingCanBeSwappedOrNoStepIsBeforeTheyAreRefusedInWords) {
+  game_control::ScenarioFile scenario = *loaded_.scenario;
+  scenario.hands[test::kLeftHand.value].role = Role::kInstructor;
+  SessionRegistry one_hand(scenario, kEpoch, false);
+  SessionRegistry two_hands(*loaded_.scenario, kEpoch, false);
+  const JoinProofs proofs{.seat = true, .key = true};
+  std::uint32_t id = 0;
+  const auto command = [&](SessionRegistry& registry, CommandKind kind) {
+    const ClientId client = registry.join({.client_guid = "b", .role = Role::kInstructor}, proofs, 5).client;
+    registry.updatePhase(RunPhase::kRunning);
+    return registry.handleCommand({client, ++id, kind});
+  };
+  EXPECT_THAT(command(one_hand, CommandKind::kSwapHands).reason, HasSubstr("two hands are swapped"));
+  EXPECT_TRUE(command(two_hands, CommandKind::kSwapHands).accepted);
+  SessionRegistry of_steps(*loaded_.scenario, kEpoch, false);
+  of_steps.updateStep(0);
+  EXPECT_THAT(command(of_steps, CommandKind::kBack).reason, HasSubstr("no step before the first one"));
+  EXPECT_TRUE(command(of_steps, CommandKind::kSkipStep).accepted);
+  EXPECT_TRUE(command(of_steps, CommandKind::kBack).accepted) << "it is in the second step by then";
+  SessionRegistry later(*loaded_.scenario, kEpoch, false);
+  later.updateStep(1);
+  EXPECT_TRUE(command(later, CommandKind::kBack).accepted);
+}
+
 TEST_F(RegistryCommands, CommandsThatCannotTakeEffectNowAreRefusedWithAReason) {
   const ClientId instructor = join("t", Role::kInstructor).client;
   const auto answer = [&](CommandKind kind) { return command(instructor, kind).reason; };
@@ -231,6 +255,7 @@ TEST_F(RegistryCommands, CommandsThatCannotTakeEffectNowAreRefusedWithAReason) {
   for (const CommandKind kind : {CommandKind::kFulfilled, CommandKind::kPause, CommandKind::kResume,
                                  CommandKind::kReset, CommandKind::kSkipStep, CommandKind::kSwapHands})
     EXPECT_THAT(answer(kind), HasSubstr("waits for people"));
+  EXPECT_THAT(command(instructor, CommandKind::kRelease, "left").reason, HasSubstr("waits for people"));
   EXPECT_THAT(command(instructor, CommandKind::kSignal, "bell").reason, HasSubstr("waits for people"));
   EXPECT_TRUE(changes().empty());
 
@@ -261,13 +286,13 @@ TEST_F(RegistryCommands, ChangesThatWaitAreLimitedAndDoNotDelayAStop) {
   const ClientId instructor = join("t", Role::kInstructor).client;
   (void)changes();
   for (std::size_t i = 0; i < SessionRegistry::kMostWaitingChanges; ++i)
-    ASSERT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted) << i;
-  EXPECT_EQ(command(instructor, CommandKind::kRelease, "left").refusal, Refusal::kTooMany);
+    ASSERT_TRUE(command(instructor, CommandKind::kSetCollision, "bay part", 0.0).accepted) << i;
+  EXPECT_EQ(command(instructor, CommandKind::kSetCollision, "bay part", 0.0).refusal, Refusal::kTooMany);
   registry_.engageEmergencyStop();
   const auto first = changes();
   ASSERT_FALSE(first.empty());
   EXPECT_EQ(first[0].kind, ChangeKind::kSetEmergencyStop);
-  EXPECT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted);
+  EXPECT_TRUE(command(instructor, CommandKind::kSetCollision, "bay part", 0.0).accepted);
 }
 
 // of commands that may end a step the state machine takes one a tick, of which sixteen may come with each
@@ -341,6 +366,7 @@ TEST_F(RegistryCommands, AReasonCanBeSentAndNamesWhatThereIsHoweverLongTheUnknow
 
 TEST_F(RegistryCommands, AHandIsReleasedByItsName) {
   const ClientId instructor = join("t", Role::kInstructor).client;
+  registry_.updatePhase(RunPhase::kRunning);
   (void)changes();
   EXPECT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted);
   const auto taken = changes();

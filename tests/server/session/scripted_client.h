@@ -101,6 +101,8 @@ class ScriptedClient {
     return answered;
   }
   void ask(const Join& join) { (void)joins_.write(join); }
+  /// As a program does that has not heard the answer.
+  void repeatJoin() { (void)joins_.write(join_); }
   /// DeviceInput of `hand`, by default of the first hand it controls.
   void sendPose(std::uint32_t seq, const Pose& X_WH, HandId hand = {}) {
     DeviceInput input{.hand = hand.valid() ? hand : controlledHand(),

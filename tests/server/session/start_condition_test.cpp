@@ -49,10 +49,14 @@ TEST_F(StartConditionTest, IsMetWhileAllHandsAreControlledAndAllRolesAreThere) {
   const auto condition = StartCondition::make(*loaded_.scenario, {"right", "left", "recorder"});
   ASSERT_TRUE(condition);
   EXPECT_FALSE(condition->isMet(registry_));
+  const auto missing = [&] { return condition->missing(*loaded_.scenario, registry_); };
+  EXPECT_THAT(missing(), testing::ElementsAre("right", "left", "recorder"));
   const ClientId both = join("trainee", Role::kTrainee, {"right", "left"}).client;
   EXPECT_FALSE(condition->isMet(registry_)) << "no recorder yet";
+  EXPECT_THAT(missing(), testing::ElementsAre("recorder"));
   const ClientId recorder = join("recorder", Role::kRecorder).client;
   EXPECT_TRUE(condition->isMet(registry_));
+  EXPECT_THAT(missing(), testing::IsEmpty());
   registry_.leave(recorder);
   EXPECT_FALSE(condition->isMet(registry_));
   (void)join("another recorder", Role::kRecorder);

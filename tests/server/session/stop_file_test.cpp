@@ -31,7 +31,8 @@ TEST_F(StopFile, HasWhatStandsAndWhatWasCleared) {
   const auto back = readStopFile(file_);
   ASSERT_TRUE(back) << back.error().what;
   ASSERT_EQ(back->standing().size(), 1U);
-  EXPECT_EQ(back->standing().begin()->first, (RaiseId{"a b\n", 1}));
+  EXPECT_EQ(back->standing().begin()->first, "a b\n");
+  EXPECT_EQ(back->standing().begin()->second.counter, 1U);
   EXPECT_EQ(back->standing().begin()->second.reason, "hand caught:\ttwo lines\n");
   StopTruth again = *back;
   EXPECT_FALSE(again.raise({"c", 7, "", ""})) << "still cleared";

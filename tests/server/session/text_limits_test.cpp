@@ -18,8 +18,8 @@ namespace {
 
 using game_control::kMaxHandName, game_control::kMaxInstruction, game_control::kMaxKind,
     game_control::kMaxLanguage;
-using game_control::kMaxLanguages, game_control::kMaxObjectName, game_control::kMaxStateName;
-using game_control::kMaxStateTitle, game_control::kMaxTitle;
+using game_control::kMaxLanguages, game_control::kMaxObjectName, game_control::kMaxSignalName;
+using game_control::kMaxStateName, game_control::kMaxStateTitle, game_control::kMaxTitle;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
@@ -72,6 +72,10 @@ TEST(TextLimits, AreThoseOfTheMessages) {
               return wire::encode(SceneHand{HandId{0}, text, Role::kTrainee, ObjectId{0}}).has_value();
             }),
             kMaxHandName);
+  EXPECT_EQ(mostThatFits([](const std::string& text) {
+              return wire::encode(SceneSignal{0, text}).has_value();
+            }),
+            kMaxSignalName);
 }
 
 TEST(TextLimits, AnInstructionThatCannotBeSentIsAnErrorWithFileAndLine) {

@@ -59,7 +59,7 @@ class ChangedFile {
 class CraftedStructureFile : public StructureFile {};
 
 // sections: 0 index, 1 samples, 2 far, 3 points, 4 leaves, 5 clusters, 6 levels, 11 dilations; 12 to 15 the
-// lists of features as 3 to 6, 16 edges
+// lists of features as 3 to 6, 16 edges; 18 to 21 the planes of valleys: index, bricks, cells, planes
 TEST_F(CraftedStructureFile, AShellWhoseListsDoNotTileIsRefused) {
   (void)written();
   ChangedFile file(this->file());
@@ -199,6 +199,33 @@ TEST_F(CraftedStructureFile, DilationsThatNoBakeGivesAreRefused) {
               HasSubstr("one dilation for each corner"));
   EXPECT_THAT(file.with(80, 0.0021), HasSubstr("a largest dilation")) << "more than a voxel";
   EXPECT_THAT(file.with(88, 0.9), HasSubstr("a slope out of range"));
+}
+
+TEST_F(CraftedStructureFile, PlanesOfValleysThatNoBakeGivesAreRefused) {
+  BrickValleys valleys;
+  valleys.cells[1] = 3;
+  valleys.planes.resize(2);
+  for (auto& planes : valleys.planes)
+    for (const Vector3f& n : {Vector3f(1.0F, 0.0F, 0.0F), Vector3f(0.0F, 1.0F, 0.0F)})
+      planes.push_back({n, 0.5F});
+  structures_.field = withValleys(structures_.field, {&valleys, 1});
+  (void)written();
+  ChangedFile file(this->file());
+  ASSERT_EQ(file.count(19), 1U);
+  ASSERT_EQ(file.count(20), 2U);
+  ASSERT_EQ(file.count(21), 2U) << "equal planes are kept once";
+  EXPECT_EQ(file.with(file.first(21), 1.0F), "accepted");
+  for (const std::int32_t bad : {1, -2, DistanceField::kNoValley})
+    EXPECT_THAT(file.with(file.first(18), bad), HasSubstr("valleys")) << "index";
+  EXPECT_THAT(file.with(file.first(19), 1U), HasSubstr("valleys out of order")) << "first cell of a brick";
+  EXPECT_THAT(file.with(file.first(19) + 8, std::uint64_t{1}), HasSubstr("other cells"))
+      << "cells of a brick";
+  EXPECT_THAT(file.with(file.first(20) + 4, 4U + 1U), HasSubstr("planes of valleys out of range"));
+  for (const float bad : {std::nanf(""), 2.0F, std::numeric_limits<float>::infinity()})
+    EXPECT_THAT(file.with(file.first(21), bad), HasSubstr("planes of valleys out of range")) << "normal";
+  EXPECT_THAT(file.with(file.first(21) + 12, std::nanf("")), HasSubstr("planes of valleys out of range"));
+  EXPECT_THAT(file.with(test::kSectionsAt + 8 * (test::kSections + 18), std::uint64_t{0}),
+              HasSubstr("one entry of valleys for each brick"));
 }
 
 TEST_F(CraftedStructureFile, WhatCouldNotBeReadIsNotWritten) {

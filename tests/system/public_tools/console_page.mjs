@@ -1,5 +1,5 @@
 // Drives the console's page in Chromium. Reads commands from standard input, a line of JSON each, and answers each with a line:
-//   {"do": "open", "url": U, "width": W, "height": H, "theme": "dark" | "light", "touch": true, "language": "de-DE", "headset": true}   with an emulated headset, `headset` in the page
+//   {"do": "open", "url": U, "width": W, "height": H, "theme": "dark" | "light", "touch": true, "language": "de-DE", "headset": true, "blocked": true}   with an emulated headset, `headset` in the page; with site data blocked
 //   {"do": "await", "expression": JS}   until it is true in the page
 //   {"do": "value", "expression": JS}
 //   {"do": "type", "selector": CSS, "text": T}
@@ -10,7 +10,7 @@
 //   {"do": "sit down"}   takes part, as a person at the page would
 //   {"do": "mount", "seed": S, "seconds": T, "steps": [..]}   with the mouse, until the step is none of these
 //   {"do": "picture", "file": F}
-//   {"do": "touch", "from": [X, Y], "to": [X, Y]}   one finger, of a page that was opened with "touch": true
+//   {"do": "touch", "from": [X, Y], "to": [X, Y], "beside": [X, Y]}   one finger, of a page that was opened with "touch": true; a second one that lands beside it and rests there
 //   {"do": "axe"}   faults of accessibility, WCAG 2.2 A and AA, that are serious or worse: [[rule, element], ..]
 // Usage: node console_page.mjs PATH_OF_CHROMIUM
 import { readFileSync } from "node:fs";
@@ -28,16 +28,17 @@ const problems = [];
 let page;
 
 const commands = {
-  async open({ url, width, height, theme, touch, language, headset }) {
+  async open({ url, width, height, theme, touch, language, headset, blocked }) {
     await page?.context().close();
     const context = await browser.newContext({ viewport: { width, height }, colorScheme: theme, locale: language ?? "en-GB", hasTouch: touch === true });
     page = await context.newPage();
     // Chromium has a WebXR of its own, without a device; its layers would draw where the emulated one has none
     if (headset) await page.addInitScript(`${headsetSource}; delete window.XRWebGLBinding; window.headset = new IWER.XRDevice(IWER.metaQuest3); headset.installRuntime({ forceInstall: true });`);
+    if (blocked) await page.addInitScript(`for (const name of ["localStorage", "sessionStorage"]) Object.defineProperty(window, name, { get() { throw new DOMException("blocked", "SecurityError"); } });`);
     page.on("pageerror", (error) => problems.push(String(error)));
     page.on("console", (line) => line.type() === "error" && problems.push(line.text()));
     page.on("request", (request) => new URL(request.url()).origin !== new URL(url).origin && !request.url().startsWith("blob:") && problems.push(`asked elsewhere: ${request.url()}`));
-    await page.goto(url);
+    await page.goto(url, { timeout: 120000 });
   },
   // asked from here again and again: in the page its content security policy forbids to evaluate texts
   async await({ expression }) {
@@ -80,11 +81,13 @@ const commands = {
   async mount(task) {
     return mount(page, task);
   },
-  async touch({ from, to }) {
+  async touch({ from, to, beside }) {
     const touches = await page.context().newCDPSession(page);
     const send = (type, points) => touches.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y]) => ({ x, y })) });
+    const others = beside === undefined ? [] : [beside];
     await send("touchStart", [from]);
-    for (let i = 1; i <= 8; ++i) await send("touchMove", [[from[0] + ((to[0] - from[0]) * i) / 8, from[1] + ((to[1] - from[1]) * i) / 8]]);
+    if (beside !== undefined) await send("touchStart", [from, beside]);
+    for (let i = 1; i <= 8; ++i) await send("touchMove", [[from[0] + ((to[0] - from[0]) * i) / 8, from[1] + ((to[1] - from[1]) * i) / 8], ...others]);
     await send("touchEnd", []);
     await touches.detach();
   },

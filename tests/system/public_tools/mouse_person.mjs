@@ -1,6 +1,9 @@
 // A person at the console's page with a mouse: takes part and mounts a part. It knows what the page shows: where the line of the way begins and
 // ends on the screen, the numbers beside the hand, and which step it is. It sees with a delay, and its aim is off.
 const REACTION = 250; // [ms] from what it sees to what it does
+const REST = 100; // [ms] between two looks at a hand that is moving: it aims again where it has come to
+const LONGEST_WAY = 1500; // [ms] it watches one motion
+const STILL = 2; // [pixels] between two looks
 const AIM = 0.008; // [m] of aiming at the hand, root mean square; a tenth of it when the hand moves finely
 const PUSH = 0.05; // [m] from which on it pushes straight where it does not get nearer otherwise
 const NEAR = 0.03; // [m] it changes to fine motion
@@ -49,6 +52,19 @@ export async function sitDown(page) {
   await page.locator(".arm").click();
 }
 
+/** What it sees once the hand has come to where the mouse brought it: a slow machine shows it later. */
+async function seeAtRest(page) {
+  let seen = await page.evaluate(see);
+  for (const begun = Date.now(); Date.now() - begun < LONGEST_WAY; ) {
+    await sleep(REST);
+    const before = seen;
+    seen = await page.evaluate(see);
+    const [a, b] = [before.guide?.from, seen.guide?.from];
+    if (a === undefined || b === undefined || seen.isDeepening || seen.isAligning || Math.hypot(a.x - b.x, a.y - b.y) < STILL) break;
+  }
+  return seen;
+}
+
 /** Mounts until the step is another one than `steps`; the time that it took [s], or what stood in the way. */
 export async function mount(page, { seed, seconds, steps }) {
   const random = generator(seed);
@@ -79,7 +95,7 @@ export async function mount(page, { seed, seconds, steps }) {
   };
 
   while (Date.now() - begun < 1000 * seconds) {
-    const seen = await page.evaluate(see);
+    const seen = await seeAtRest(page);
     if (seen.isOver || (seen.step !== "" && !steps.includes(seen.step))) return { seconds: (Date.now() - begun) / 1000, log };
     await sleep(REACTION);
     if (seen.step !== last) [last, best, stuck] = [seen.step, Infinity, 0];

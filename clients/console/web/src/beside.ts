@@ -9,10 +9,41 @@ export const FRAME = "beside";
 /** A recording: a file, an address, or undefined for the gateway's own. */
 export type Played = File | string | undefined;
 
-/** Replaces this page by two, of what it plays and of another file. */
-export function showBeside(app: HTMLElement, first: Played, second: File): void {
+const DRIFT = 0.1; // [s] up to which two players are together, at speed 1
+
+/** Keeps two players together, of which one may read slower: the one that has played more since the last command waits. In s of the recordings. */
+export class Together {
+  played = 0;
+  private ahead = 0;
+
+  restart(): void {
+    this.played = this.ahead = 0;
+  }
+
+  /** So much the other one has played. */
+  hear(played: number, speed: number): void {
+    const ahead = this.played - played;
+    this.ahead = ahead > DRIFT * Math.max(1, speed) ? ahead : 0;
+  }
+
+  /** What is to be played of what could be. */
+  pass(seconds: number): number {
+    const waits = Math.min(this.ahead, seconds);
+    this.ahead -= waits;
+    return seconds - waits;
+  }
+}
+
+/** Shows two pages in the place of this one, of what it plays and of another file, until they are closed: then this one is there again as it was. */
+export function showBeside(app: HTMLElement, first: Played, second: File, onClose: () => void): void {
+  const own = [...app.childNodes];
+  const isClosed = new AbortController();
   const close = h("button", "close", t("beside.close"));
-  close.addEventListener("click", () => location.reload());
+  close.addEventListener("click", () => {
+    isClosed.abort();
+    app.replaceChildren(...own);
+    onClose();
+  });
   const frames = [first, second].map((file, i) => {
     const frame = h("iframe");
     frame.title = (typeof file === "string" ? file : file?.name) ?? t("beside.first");
@@ -25,7 +56,7 @@ export function showBeside(app: HTMLElement, first: Played, second: File): void 
     const told = data as { isReady?: true; command?: Command };
     if (told.isReady === true) frames[from].contentWindow?.postMessage({ file: [first, second][from] }, origin);
     else frames[1 - from].contentWindow?.postMessage(told, origin);
-  });
+  }, { signal: isClosed.signal });
   app.replaceChildren(h("div", "beside", h("div", "beside-head", close, h("span", "muted", t("beside.more"))), ...frames));
 }
 

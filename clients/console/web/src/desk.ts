@@ -1,18 +1,21 @@
 // The instructor's desk: a seat in the session, commands, and what the server answers to each. The emergency stop needs no seat.
-import { forbid, h, icon, marked, type Icon } from "./dom";
+import { Dialog, type Asked } from "./dialog";
+import { forbid, h, icon, marked, setOptions, type Icon } from "./dom";
 import type { DeskAnswer, LiveSource } from "./live";
-import { modelOf } from "./eventtext";
-import { NONE, RunPhase, Status, type SceneObject } from "./messages";
+import { reasonOf, reasonOfLoss } from "./eventtext";
+import { RunPhase, Status, type SceneObject } from "./messages";
 import { Pairs } from "./pairs";
 import { whyNot, type Permitted } from "./permits";
 import { Presses } from "./presses";
+import { askForSeat, PASS } from "./seat";
 import type { Session } from "./session";
-import { hasText, language, retold, SPEAKERS, t, type Key } from "./strings";
+import { Signals } from "./signals";
+import { keep, kept, t, type Key } from "./strings";
 
 const NOTICE = 8000; // [ms] that an answer is shown
 const NOTICES = 3;
+const ROLE = "role"; // in this tab's memory, of a seat that is taken again
 const OTHER_LABELS: Record<string, Key> = { note: "desk.note.said", clear: "stop.clear", collision: "desk.collision", kick: "desk.kick", give: "desk.give", guide: "guide" };
-export const PASS = "pass"; // in the address, and in this tab's memory
 
 export class Desk {
   readonly stop = h("button", "stop");
@@ -24,19 +27,24 @@ export class Desk {
   readonly alarm = h("span", "alarm");
   /** That the server has granted; empty: looks on. */
   role = "";
+  /** The seat, among those who are present. */
+  client?: number;
   /** Whether this console has a folder for recordings. */
   canRecord = false;
-  private dialog = h("dialog", "");
+  /** Whether what is known of the stop is so now. */
+  isHeard: () => boolean = () => true;
+  /** Sessions of which the server has not said that it knows of the stop. */
+  unstopped: () => string[] = () => [];
+  private dialog = new Dialog(() => void this.raise());
   private buttons: { button: HTMLButtonElement; key: Key; icon?: Icon; shows?: () => boolean }[] = [];
-  private signals = h("span", "signals");
+  private signals: Signals;
   private note = h("input", "");
   private why = h("p", "why");
-  private asked?: { word: string; go: HTMLButtonElement; why: HTMLElement }; // by the dialog
+  private asked?: Asked & { word: string }; // a command, by the dialog
   private more = h("details", "more");
   private given = h("select"); // object to be handed over
   private hands = [h("select"), h("select")]; // that gets, that releases
   private pairs: Pairs;
-  private listed = "";
   private presses = new Presses(() => this.source.ask("deskCommand", { words: ["emergency", t("stop.reason")] }), () => this.showAlarm());
   private isEnded = new AbortController();
   private permitted: Permitted = {}; // to the seat that was granted last
@@ -47,10 +55,11 @@ export class Desk {
   constructor(private source: LiveSource, private session: Session, gatewayRole: string, private isOfAll = false) {
     const pass = new URLSearchParams(location.hash.slice(1)).get(PASS);
     if (pass !== null) {
-      sessionStorage.setItem(PASS, pass);
+      keep(PASS, pass, "tab");
       history.replaceState(null, "", location.pathname + location.search);
+      // not once more after the person has left the seat
+      if (kept(ROLE, "tab") === null && gatewayRole !== "") keep(ROLE, gatewayRole, "tab");
     }
-    if (sessionStorage.getItem(PASS) !== null && sessionStorage.getItem("role") === null && gatewayRole !== "") sessionStorage.setItem("role", gatewayRole);
     this.notices.setAttribute("role", "status");
     this.stop.addEventListener("click", () => void this.raise());
     this.clear.addEventListener("click", () => void this.command("clear"));
@@ -62,6 +71,7 @@ export class Desk {
       this.show();
     };
     this.alarm.setAttribute("role", "alert");
+    this.signals = new Signals(session, (...words) => this.command(...words));
     this.pairs = new Pairs(session, (a, b, isOn) => this.command("collision", a, b, isOn ? "on" : "off"), () => this.whyNot("collision"));
     this.more.addEventListener("toggle", () => this.pairs.show());
     // Escape and a click beside it close it
@@ -69,7 +79,6 @@ export class Desk {
     addEventListener("keydown", ({ key }) => key === "Escape" && (this.more.open = false), { signal });
     addEventListener("pointerdown", ({ target }) => target instanceof Node && !this.more.contains(target) && (this.more.open = false), { signal });
     this.build();
-    document.body.append(this.dialog);
     this.setWords();
   }
 
@@ -93,7 +102,7 @@ export class Desk {
     const isRecording = (): boolean => this.session.link?.recorded === true;
     add(this.bar, "desk.record", ["record", "start"], "record", () => this.canRecord && !isRecording());
     add(this.bar, "desk.record.stop", ["record", "stop"], "over", () => this.canRecord && isRecording());
-    this.bar.append(this.signals);
+    this.bar.append(this.signals.buttons);
     this.note.maxLength = 200;
     this.note.addEventListener("keydown", (event) => {
       if (event.key !== "Enter" || this.note.value.trim() === "") return;
@@ -109,17 +118,18 @@ export class Desk {
     const addRow = (host: HTMLElement, key: Key, words: () => string[]): void => {
       const button = h("button", "");
       button.dataset["command"] = words()[0];
-      button.addEventListener("click", () => void this.command(...words()));
+      button.addEventListener("click", () => (words().includes("") ? this.notify(false, `${t(key)}: ${t("desk.choose")}`) : void this.command(...words())));
       this.buttons.push({ button, key });
       host.append(button);
     };
     addRow(give, "desk.give", () => ["give", this.given.value, this.hands[0].value]);
     addRow(release, "desk.release", () => ["release", this.hands[1].value]);
+    addRow(this.signals.row, "desk.signal", () => ["signal", this.signals.chosen]);
     const whole = row();
     add(whole, "desk.swap", ["swap"], "swap");
     add(whole, "desk.reset", ["reset"], "repeat", undefined, true);
     add(whole, "desk.end", ["stop"], "over", undefined, true);
-    rows.append(give, release, this.pairs.element, whole);
+    rows.append(give, release, this.signals.row, this.pairs.element, whole);
     this.more.append(h("summary", ""), rows);
   }
 
@@ -133,7 +143,7 @@ export class Desk {
       [this.given, "desk.object"], [this.hands[0], "desk.hand"], [this.hands[1], "desk.hand"],
     ];
     for (const [element, key] of labels) element.setAttribute("aria-label", t(key));
-    this.listed = "";
+    this.signals.setWords();
     this.showAlarm();
     this.show();
   }
@@ -151,7 +161,18 @@ export class Desk {
   /** Empty while nothing is wrong. */
   get alarmText(): string {
     const { isUnconfirmed, isMissed, reached } = this.presses;
-    return !isUnconfirmed ? "" : t(isMissed ? "stop.missed" : reached === "devices" ? "stop.devices" : reached === "some sessions" ? "stop.partly" : "stop.unconfirmed");
+    return !isUnconfirmed ? "" : t(isMissed ? "stop.missed" : reached === "devices" ? "stop.devices" : reached === "some sessions" ? "stop.partly" : "stop.unconfirmed") + this.namesOfUnstopped();
+  }
+
+  /** Of all sessions: those that have not confirmed the stop. */
+  private namesOfUnstopped(): string {
+    const names = this.presses.reached === "some sessions" ? this.unstopped() : [];
+    return names.length === 0 ? "" : `. ${t("stop.partly.names", { names: names.join(", ") })}`;
+  }
+
+  /** While a stop is unconfirmed: who has answered since. */
+  renewAlarm(): void {
+    if (this.presses.isUnconfirmed && this.alarm.querySelector("span")?.textContent !== this.alarmText) this.showAlarm();
   }
 
   /** The session is there again, or all of them. */
@@ -163,12 +184,20 @@ export class Desk {
 
   /** A raise or a clear of the stop, or the state of the run, has come from the session. */
   hearStop(): void {
-    this.presses.hear(() => this.source.isOpen && this.session.link?.state === "joined" && this.session.isStopped);
+    this.presses.hear(() => this.source.isOpen && this.session.link?.state === "joined" && this.session.isStopKnown);
   }
 
   /** Why the server would refuse a command now, by its first word. */
   whyNot(word: string): Key | undefined {
+    if (word === "give" && this.role !== "" && this.hands[0].options.length === 0) return whyNot(word, this.permitted, this.session) ?? "refusal.nobody_there";
+    if (word === "release" && this.role !== "" && !this.holdsAnything(this.hands[1].value)) return whyNot(word, this.permitted, this.session) ?? "refusal.holds_nothing";
     return whyNot(word, this.role === "" ? undefined : this.permitted, this.session);
+  }
+
+  private holdsAnything(name: string): boolean {
+    const { session } = this;
+    const hand = [...session.sceneHands.values()].find((known) => known.name === name);
+    return hand !== undefined && [...session.grabs.values()].some(({ hand_id, object_id }) => hand_id === hand.hand_id && !session.isOwn(object_id));
   }
 
   /** What does nothing now says why. */
@@ -177,7 +206,7 @@ export class Desk {
     for (const button of this.bar.querySelectorAll<HTMLElement>("button[data-command]")) {
       const why = this.whyNot(button.dataset["command"]?.split(" ")[0] ?? "");
       forbid(button, why === undefined ? "" : t(why));
-      if (why !== undefined && !button.hidden) reasons.add(t(why));
+      if (why !== undefined && !button.hidden && (this.more.open || !this.more.contains(button))) reasons.add(t(why));
     }
     const text = [...reasons].join(" · ");
     if (this.why.dataset["text"] !== text) this.why.replaceChildren(...(text === "" ? [] : [icon("warn"), h("span", "", text)]));
@@ -188,12 +217,16 @@ export class Desk {
     this.asked.why.textContent = why === undefined ? "" : t(why);
   }
 
+  get canClear(): boolean {
+    return this.role !== "" && this.permitted["clear"] !== undefined;
+  }
+
   /** Called when the session has changed. */
   show(): void {
     const { session } = this;
-    const isRaised = session.isRaised;
+    const isRaised = session.isRaised && this.isHeard();
     const words: Key = isRaised ? "stop.again" : this.isOfAll ? "stop.all" : "stop.press";
-    this.clear.hidden = !isRaised || this.role === "" || this.permitted["clear"] === undefined;
+    this.clear.hidden = !isRaised || !this.canClear;
     if (this.stop.dataset["words"] !== t(words)) {
       this.stop.dataset["words"] = t(words);
       this.stop.replaceChildren(icon("stop"), h("span", "", t(words)), h("kbd", "", t("stop.key")));
@@ -203,7 +236,7 @@ export class Desk {
     if (this.sit.textContent !== label) this.sit.replaceChildren(icon("person"), label);
     this.sit.hidden = this.role === "" && session.link?.state !== "joined"; // in no session there is a seat
     this.bar.hidden = this.role === "" || session.isOver;
-    if (session.isOver) this.withdraw("seat");
+    if (session.isOver) for (const name of ["seat", "hand"]) this.withdraw(name);
     for (const offer of this.notices.querySelectorAll<HTMLElement>("[data-offer] button")) offer.hidden = session.isOver || session.link?.state !== "joined";
     for (const { button, shows } of this.buttons) button.hidden = shows !== undefined && !shows();
     if (this.more.open) this.pairs.show();
@@ -211,37 +244,23 @@ export class Desk {
     this.showPermitted();
   }
 
-  /** Signals that the step waits for, objects and hands, by the names that people read. */
+  /** Signals, objects and hands, by the names that people read. */
   private list(): void {
     const { session } = this;
-    const waited = (session.progress?.conditions ?? []).map(({ text }) => text).filter((text) => text.startsWith("signal ") || text === "command fulfilled" || text === "fulfilled");
-    const listed = `${waited.join()} ${session.objects.size} ${session.states.size} ${session.sceneHands.size}`;
-    if (listed === this.listed) return;
-    this.listed = listed;
-    this.signals.replaceChildren(
-      ...waited.map((text) => {
-        const name = text.replace(/^signal /, "");
-        const isSignal = text.startsWith("signal ");
-        const button = h("button", "", icon("bell"), isSignal ? name.replace(/_/g, " ") : t("desk.fulfilled"));
-        button.dataset["command"] = isSignal ? `signal ${name}` : "fulfilled";
-        button.addEventListener("click", () => void (isSignal ? this.command("signal", name) : this.command("fulfilled")));
-        return button;
-      }),
-    );
-    const objects = [...session.objects.values()].filter((object) => !session.isOwn(object.object_id));
-    const options = (list: { name: string; title: string }[]): HTMLElement[] => list.map(({ name, title }) => Object.assign(h("option", "", title || name), { value: name }));
     const named = (list: SceneObject[]): { name: string; title: string }[] => list.map((object) => ({ name: object.name, title: session.titleOf(object.object_id) }));
-    this.given.replaceChildren(...options(named(objects.filter((object) => session.states.get(object.object_id)?.status !== Status.Fixed))));
-    const hands = [...session.sceneHands.values()].filter((hand) => !session.isTracked(hand.hand_id)).map((hand) => ({ name: hand.name, title: session.nameOfHand(hand.hand_id) }));
-    for (const select of this.hands) select.replaceChildren(...options(hands));
+    setOptions(this.given, named([...session.objects.values()].filter((object) => !session.isOwn(object.object_id) && session.states.get(object.object_id)?.status !== Status.Fixed)));
+    // a hand of nobody holds nothing, and takes nothing
+    const moved = new Set([...session.people.values()].filter(({ alive }) => alive).flatMap(({ hands }) => Array.from(hands)));
+    const hands = [...session.sceneHands.values()].filter((hand) => !session.isTracked(hand.hand_id) && moved.has(hand.hand_id)).map((hand) => ({ name: hand.name, title: session.nameOfHand(hand.hand_id) }));
+    for (const select of this.hands) setOptions(select, hands);
+    this.signals.show();
   }
 
   /** Who sits at this page takes the seat again after a loss of the connection, and of the session. */
   async takeSeatAgain(): Promise<void> {
-    const role = sessionStorage.getItem("role");
-    const key = sessionStorage.getItem(PASS);
+    const [role, key] = [kept(ROLE, "tab"), kept(PASS, "tab")];
     if (role === null || key === null || this.role !== "") return;
-    if (!(await this.takeSeat(role, localStorage.getItem("name") ?? "", key, true))) this.offerSeat(this.lastRefusal);
+    if (!(await this.takeSeat(role, kept("name") ?? "", key, true))) this.offerSeat(this.lastRefusal);
   }
 
   loseSeat(): void {
@@ -258,7 +277,8 @@ export class Desk {
   end(): void {
     this.isEnded.abort();
     this.presses.forget();
-    for (const element of [this.stop, this.clear, this.sit, this.bar, this.notices, this.alarm, this.dialog]) element.remove();
+    this.dialog.remove();
+    for (const element of [this.stop, this.clear, this.sit, this.bar, this.notices, this.alarm]) element.remove();
   }
 
   /** `isAgain`: its refusal is not said here. */
@@ -266,11 +286,12 @@ export class Desk {
     const answer = await this.source.ask("deskSit", { role, name: name || t("desk.somebody"), key });
     this.role = answer?.role ?? "";
     this.permitted = answer?.commands ?? {};
+    this.client = answer?.client;
     this.lastRefusal = answer === undefined ? t("desk.offline") : reasonOf(answer);
     if (answer?.accepted === true) {
       this.withdraw("seat");
-      sessionStorage.setItem(PASS, key);
-      sessionStorage.setItem("role", role);
+      keep(PASS, key, "tab");
+      keep(ROLE, role, "tab");
     }
     if (!isAgain || answer?.accepted === true) this.tell(t(`role.name.${role}` as Key), answer);
     this.show();
@@ -278,7 +299,7 @@ export class Desk {
   }
 
   private async leave(): Promise<void> {
-    sessionStorage.removeItem("role");
+    keep(ROLE, null, "tab");
     this.withdraw("seat");
     const answer = await this.source.ask("deskLeave");
     this.role = "";
@@ -287,20 +308,23 @@ export class Desk {
   }
 
   private askForSeat(): void {
-    const role = h("select", "");
-    role.append(...(["instructor", "trainee"] as const).map((name) => Object.assign(h("option", "", t(`role.name.${name}`)), { value: name })));
-    const name = Object.assign(h("input", ""), { maxLength: 40, value: localStorage.getItem("name") ?? "", autocomplete: "off" });
-    const key = Object.assign(h("input", ""), { type: "password", autocomplete: "off", value: sessionStorage.getItem(PASS) ?? "" });
-    const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", ...marked(t(hint)))]));
-    this.openDialog(t("desk.sit.title"), [field("desk.sit.role", role), field("desk.sit.name", name), field("desk.sit.key", key, "desk.sit.hint")], t("desk.sit.do"), async () => {
-      localStorage.setItem("name", name.value);
-      return this.takeSeat(role.value, name.value, key.value.trim());
+    this.asked = undefined;
+    askForSeat(this.dialog, { title: t("desk.sit.title"), action: t("desk.sit.do"), roles: ["instructor", "trainee"], done: (...seat) => this.takeSeat(...seat) });
+  }
+
+  /** Before this page leaves the session to play a file. */
+  askToLeave(file: string, leave: () => void): void {
+    this.asked = undefined;
+    this.dialog.open(t("drop.leave"), [h("p", "muted", t("drop.leave.more", { name: file }))], t("drop.leave.do"), async () => {
+      leave();
+      return true;
     });
   }
 
   private confirm(key: Key, words: string[], text = t("desk.sure")): void {
     if (this.whyNot(words[0]) !== undefined) return void this.command(...words);
-    this.openDialog(t(key), [h("p", "muted", text)], t(key), () => this.command(...words), words[0]);
+    this.asked = { word: words[0], ...this.dialog.open(t(key), [h("p", "muted", text)], t(key), () => this.command(...words)) };
+    this.showPermitted();
   }
 
   /** Removes a person from the session, by the number of the client. */
@@ -311,29 +335,6 @@ export class Desk {
 
   goTo(step: string, title: string): void {
     this.confirm("desk.goto", ["goto", step], t("desk.goto.more", { step: title }));
-  }
-
-  /** `word`: of the command that is asked about. */
-  private openDialog(title: string, nodes: Node[], action: string, done: () => Promise<boolean>, word?: string): void {
-    const cancel = Object.assign(h("button", "", t("desk.cancel")), { type: "button" });
-    const go = h("button", "primary", action);
-    // the one beside the dialog cannot be pressed while it is open
-    const stop = Object.assign(h("button", "stop", icon("stop"), t("stop.press")), { type: "button" });
-    stop.addEventListener("click", () => void this.raise());
-    const why = h("p", "warn");
-    why.setAttribute("role", "status");
-    const form = h("form", "", h("h2", "", title), ...nodes, why, h("div", "row end", stop, cancel, go));
-    this.asked = word === undefined ? undefined : { word, go, why };
-    this.showPermitted();
-    cancel.addEventListener("click", () => this.dialog.close());
-    form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      void done().then((accepted) => accepted && this.dialog.close());
-    });
-    this.dialog.replaceChildren(form);
-    this.dialog.showModal();
-    // the stop is the first in the order, and Enter is not to press it; Escape leaves
-    if (form.querySelector("input, select") === null) cancel.focus();
   }
 
   /** The emergency stop; also when one stands. */
@@ -392,36 +393,4 @@ export class Desk {
   withdraw(name: string): void {
     this.notices.querySelector(`[data-offer="${name}"]`)?.remove();
   }
-}
-
-/** Texts of the gateway and of the server, of a seat that is no more. */
-const LOSSES: [RegExp, Key][] = [
-  [/ was removed by (?<by>.+)$/, "lost.removed"],
-  [/ is gone$/, "lost.gone"],
-  [/: has left$|has been silent for |join first$/, "lost.expired"],
-  [/^nothing was heard of this page/, "lost.page"],
-];
-
-/** Why a seat was lost, in this page's language where it has words for it. */
-export function reasonOfLoss(text: string): string {
-  const known = LOSSES.find(([pattern]) => pattern.test(text));
-  if (known === undefined) return text.replace(/\.$/, "");
-  return t(known[1], { by: retold(known[0].exec(text)?.groups?.["by"] ?? "", ...SPEAKERS) });
-}
-
-/** What the gateway or the server answers, in this page's language where it has words for it. In English the server says more: it names what is missing. */
-export function reasonOf(answer: DeskAnswer): string {
-  const key = `refusal.${answer.code}` as Key;
-  if (answer.accepted || answer.code === undefined || !hasText(key)) return answer.text;
-  return language === "en" && answer.text !== "" ? answer.text : t(key, { reason: answer.text }).replace(/: *$/, "");
-}
-
-/** The hands that somebody moves, each with its device, and the age of their contacts [ms]. */
-export function devicesOf(session: Session, hands: number[]): string {
-  const names = hands.filter((hand) => hand !== NONE && !session.isTracked(hand)).map((hand) => {
-    const device = session.deviceOf(hand);
-    return device === undefined ? session.nameOfHand(hand) : `${session.nameOfHand(hand)}: ${modelOf(device)}`;
-  });
-  const ages = hands.flatMap((hand) => session.hands.get(hand)?.manifold_age ?? []).filter((age) => age !== NONE);
-  return [...names, ...(ages.length === 0 ? [] : [`${Math.max(...ages)} ms`])].join(", ");
 }

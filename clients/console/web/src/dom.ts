@@ -45,6 +45,16 @@ export function forbid(button: HTMLElement, why: string): void {
   else button.setAttribute("aria-disabled", "true");
 }
 
+/** Gives a list these options. What was chosen stays; where it is no longer there, nothing is chosen: nobody chose the first one instead. */
+export function setOptions(select: HTMLSelectElement, options: { name: string; title: string }[]): void {
+  const listed = JSON.stringify(options);
+  if (select.dataset["listed"] === listed) return;
+  select.dataset["listed"] = listed;
+  const before = select.options.length === 0 ? undefined : select.value;
+  select.replaceChildren(...options.map(({ name, title }) => Object.assign(h("option", "", title || name), { value: name })));
+  if (before !== undefined) select.value = before;
+}
+
 /** Pixels of the page in one of an element, which may be zoomed. */
 export function zoomOf(element: HTMLElement): number {
   return element.getBoundingClientRect().width / Math.max(1, element.offsetWidth) || 1;
@@ -82,6 +92,9 @@ const PATHS = {
   follow: "M7 0h2v2.100A6 6 0 0 1 13.900 7H16v2h-2.100A6 6 0 0 1 9 13.900V16H7v-2.100A6 6 0 0 1 2.100 9H0V7h2.100A6 6 0 0 1 7 2.100zM8 4a4 4 0 1 0 0 8 4 4 0 0 0 0-8zM8 6.500a1.500 1.500 0 1 1 0 3 1.500 1.500 0 0 1 0-3z",
   eye: "M8 3c3.500 0 6 2.500 7.500 5-1.500 2.500-4 5-7.500 5S2 10.500.500 8C2 5.500 4.500 3 8 3zM8 5a3 3 0 1 0 0 6 3 3 0 0 0 0-6zM8 6.500a1.500 1.500 0 1 1 0 3 1.500 1.500 0 0 1 0-3z",
   section: "M1 3h6v10H1zM7 0h2v16H7zM10.500 3H12v2h-1.500zM13.500 3H15v2h-1.500zM13.500 6.500H15v3h-1.500zM13.500 11H15v2h-1.500zM10.500 11H12v2h-1.500z",
+  list: "M1 2h3v3H1zM6 2.500h9v2H6zM1 6.500h3v3H1zM6 7h9v2H6zM1 11h3v3H1zM6 11.500h9v2H6z",
+  hidden: "M2.400 1.300l12.300 12.300-1.400 1.400-2.500-2.500C9.900 12.800 9 13 8 13 4.500 13 2 10.500.500 8c.700-1.200 1.700-2.400 2.900-3.300L1 2.700zM8 3c3.500 0 6 2.500 7.500 5-.500.900-1.200 1.700-2 2.500L6.300 3.300C6.800 3.100 7.400 3 8 3z",
+  open: "M1 3h5l2 2h7v2H4.500L3 12H1zM5 8h11l-2 6H3z",
   measure: "M.500 5h15v6H.500zM2 6.500v3h12v-3h-1V8.500h-1v-2h-1.500V8.500h-1v-2H8V8.500H7v-2H5.500V8.500h-1v-2H3V8.500z",
   sphere: "M8 1a7 7 0 1 1 0 14A7 7 0 0 1 8 1zM8 2.500a5.500 5.500 0 0 0-5.450 4.800C3.800 8.400 5.800 9 8 9s4.200-.600 5.450-1.700A5.500 5.500 0 0 0 8 2.500zM2.600 9.100a5.500 5.500 0 0 0 10.800 0C12 10 10.100 10.500 8 10.500S4 10 2.600 9.100z",
   beside: "M1 2h6v12H1zM2.500 3.500v9h3v-9zM9 2h6v12H9zM10.500 3.500v9h3v-9z",

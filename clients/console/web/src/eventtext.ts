@@ -1,7 +1,8 @@
 // Events of the server in the language of this page. The server writes English; what has no rule here stays as it is.
+import type { DeskAnswer } from "./live";
 import type { EventLog } from "./messages";
 import type { Session } from "./session";
-import { hasText, localized, n, retold, SPEAKERS, t, type Key } from "./strings";
+import { hasText, language, localized, n, retold, SPEAKERS, t, type Key } from "./strings";
 
 const ROLES = ["admin", "instructor", "trainee", "observer", "recorder"]; // as in the messages
 /** The rules of the safety layer by their bits, as devices/safety_rules.cpp names them. */
@@ -23,18 +24,23 @@ const SAFETY = [
   "dead-man switch released",
   "emergency stop",
   "forces off",
+  "not armed",
 ];
 /** Texts by what they match. Groups: who and reason as they are; step, title, hand, role and word are translated. */
 const RULES: [RegExp, Key][] = [
   [/^(?<who>.+): a hand without input is held still after (?<freeze>\d+) ms and parked after (?<park>\d+) ms; inputs come up to (?<gap>\d+) ms apart, (?<lost>[\d.]+) % are lost$/, "event.link"],
+  [/^(?<who>.+): contacts are not felt over this link: (?<delay>\d+) ms one way, (?<most>\d+) ms at most; guidance continues$/, "event.link.far"],
+  [/^(?<who>.+): contacts are felt again: (?<delay>\d+) ms one way$/, "event.link.near"],
   [/^waiting for people$/, "event.waiting"],
+  [/^waiting for people: (?<missing>.+)$/, "event.waiting.for"],
   [/^running$/, "event.running"],
   [/^paused$/, "event.paused"],
   [/^stopped$/, "event.stopped"],
   [/^emergency stop$/, "event.emergency"],
   [/^forces frozen$/, "event.frozen"],
   [/^everything is mounted$/, "event.mounted"],
-  [/^ended, (?<count>\d+) steps? skipped(?:, (?<late>\d+) steps? not done in time)?$/, "event.ended"],
+  [/^ended, (?<count>\d+) steps? skipped$/, "event.ended"],
+  [/^ended, (?<count>\d+) steps? skipped, (?<late>\d+) steps? not done in time$/, "event.ended.both"],
   [/^ended, (?<late>\d+) steps? not done in time$/, "event.ended.late"],
   [/^step '(?<step>[^']+)' was not done in time(?:: (?<reason>.+))?$/, "event.failed"],
   [/^(?<step>\w+) \((?<seconds>[\d.]+) s\)$/, "event.step.time"],
@@ -51,12 +57,14 @@ const RULES: [RegExp, Key][] = [
   [/^(?<who>.+?): (?<word>\w+)(?: .*)? \(an emergency stop came before its tick\)$/, "event.dropped.stop"],
   [/^(?<who>.+?): (?<word>\w+)(?: .*)? \(the run has ended before its tick\)$/, "event.dropped.end"],
   [/^engaged by (?<who>.+?): (?<reason>.*)$/, "event.engaged"],
-  [/^the emergency stop stands since before this start: engaged by (?<who>.+?): (?<reason>.*)$/, "event.stands"],
+  [/^an emergency stop raised before this server's start still stands: engaged by (?<who>.+?): (?<reason>.*)$/, "event.stands"],
   [/^cleared by (?<who>.+?): (?<reason>.*?)(?:; )?the session is paused until 'resume'$/, "event.cleared"],
   [/^hand '(?<hand>[^']+)' is guided no more: (?<reason>.+)$/, "event.guidance.ended"],
   [/^hand (?<hand>\w+): safety: (?<rule>.+) \((?<force>[\d.]+) N requested.*\), step \d+$/, "event.safety"],
   [/^hand (?<hand>\w+): safety: (?<rule>.+) ended, active for (?<seconds>[\d.]+) s, step \d+$/, "event.safety.ended"],
   [/^(?<who>.+?): '(?<word>\w+)': (?<reason>.+)$/, "event.refused"],
+  [/^(?<count>\d+) ticks? (?:is|are) missing in the journal: (?<cause>.+)$/, "event.journal"],
+  [/^(?<count>\d+) more ticks? (?:is|are) missing in the journal, (?<all>\d+) in all: (?<cause>.+)$/, "event.journal.more"],
 ];
 
 /** What moves a hand; `radius` [m]: what it reaches about the centre of its workspace. */
@@ -111,6 +119,16 @@ function command(word: string): string {
   return hasText(key) ? t(key) : word;
 }
 
+/** Hands and roles by their names, as the server lists those that it waits for. */
+export function missingOf(session: Session, names: string): string {
+  const wordOf = (name: string): string => {
+    const hand = [...session.sceneHands.values()].find((known) => known.name === name);
+    if (hand !== undefined) return session.placeOfHand(hand.hand_id);
+    return ROLES.includes(name) ? t(`role.${ROLES.indexOf(name)}` as Key) : name;
+  };
+  return [...new Set(names.split(", ").map(wordOf))].join(", ");
+}
+
 function value(session: Session, name: string, text: string): string {
   switch (name) {
     case "step": return readable(session, text);
@@ -124,12 +142,14 @@ function value(session: Session, name: string, text: string): string {
     case "who": case "by": return retold(text, ...SPEAKERS);
     case "seconds": case "ms": case "force": case "lost": return n(Number(text), /\.(\d+)/.exec(text)?.[1].length ?? 0);
     case "reason": return retold(text, "stop.reason", "refusal.stopped", "refusal.too_many");
+    case "cause": return retold(text, "journal.slow", "journal.recorder");
+    case "missing": return missingOf(session, text);
     case "rule": return SAFETY.includes(text) ? t(`safety.${SAFETY.indexOf(text)}` as Key) : text;
     default: return text;
   }
 }
 
-export function kindOf(event: EventLog): string {
+export function kindOf(event: Pick<EventLog, "kind">): string {
   const key = `event.kind.${event.kind.replace(/ /g, "_")}`;
   return hasText(key) ? t(key) : event.kind;
 }
@@ -150,4 +170,57 @@ export function textOf(session: Session, event: Pick<EventLog, "kind" | "text">)
     return t(key, values).replace(twice, "").replace(/[:;,.] *$/, "").trim();
   }
   return (event.kind.startsWith("step") ? readable(session, event.text) : event.text).replace(/(?<!\.)\.$/, "");
+}
+
+/** Texts of the gateway and of the server, of a seat that is no more. */
+const LOSSES: [RegExp, Key][] = [
+  [/ was removed by (?<by>.+)$/, "lost.removed"],
+  [/ is gone$/, "lost.gone"],
+  [/: has left$|has been silent for |join first$/, "lost.expired"],
+  [/^nothing was heard of this page/, "lost.page"],
+];
+
+/** Why a seat was lost, in this page's language where it has words for it. */
+export function reasonOfLoss(text: string): string {
+  const known = LOSSES.find(([pattern]) => pattern.test(text));
+  if (known === undefined) return text.replace(/\.$/, "");
+  return t(known[1], { by: retold(known[0].exec(text)?.groups?.["by"] ?? "", ...SPEAKERS) });
+}
+
+/** Why a recorder writes no more, as idl/record/mcap_writer.cpp says it; causes by the words of the C library. */
+const RECORDER: [RegExp, Key][] = [
+  [/^(?<file>.+): cannot write \((?<cause>.+)\)$/, "recorder.write"],
+  [/^(?<file>.+): cannot be closed \((?<cause>.+)\)$/, "recorder.close"],
+];
+const CAUSES: Record<string, Key> = {
+  "No space left on device": "cause.space", "Disk quota exceeded": "cause.quota", "File too large": "cause.large", "Input/output error": "cause.disk", "Read-only file system": "cause.readonly",
+};
+
+export function problemOfRecorder(text: string): string {
+  const known = RECORDER.find(([pattern]) => pattern.test(text));
+  if (known === undefined) return text;
+  const { file = "", cause = "" } = known[0].exec(text)?.groups ?? {};
+  return t(known[1], { file, cause: CAUSES[cause] === undefined ? cause : t(CAUSES[cause]) });
+}
+
+/** Answers of the gateway without a code, each of which its text here replaces: who sits at a browser reaches no file of the server. */
+const ANSWERS: [RegExp, Key][] = [
+  [/^the role (?<role>\w+) needs the key of the session: /, "refusal.needs_key"],
+  [/^this gateway was not started with --role (?<role>\w+)$/, "refusal.other_role"],
+  [/^there is no session yet$/, "refusal.record_none"],
+];
+
+function answerOf(text: string): string {
+  const known = ANSWERS.find(([pattern]) => pattern.test(text));
+  if (known === undefined) return text;
+  const role = known[0].exec(text)?.groups?.["role"] ?? "";
+  const title = `role.name.${role}`;
+  return t(known[1], { role, title: hasText(title) ? t(title) : role });
+}
+
+/** What the gateway or the server answers, in this page's language where it has words for it. In English the server says more: it names what is missing. */
+export function reasonOf(answer: DeskAnswer): string {
+  const key = `refusal.${answer.code}` as Key;
+  if (answer.accepted || answer.code === undefined || !hasText(key)) return answer.accepted ? answer.text : answerOf(answer.text);
+  return language === "en" && answer.text !== "" ? answer.text : t(key, { reason: answer.text }).replace(/: *$/, "");
 }

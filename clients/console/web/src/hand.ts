@@ -1,7 +1,9 @@
 // A hand without hardware: where the person at this page wants it, by mouse, touch and keys, and what it feels. The gateway keeps it near its proxy.
 import { Quaternion, Vector3 } from "three";
 
+import { motionOfPad } from "./gamepad";
 import { NONE, StepPhase, type Pose } from "./messages";
+import { quaternionOf, vectorOf } from "./pose";
 import { Button, encodeTargets, type HandView, type Place } from "./remote";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
@@ -24,14 +26,9 @@ const TURN_ADVANCE = 0.005; // [rad] of its turn to the ghost likewise
 const BLOCKED = 1000; // [ms] within these, else something stands in its way
 const CLOSE = 0.05; // [m] to its place a part slides along what guides it
 const FINE = 0.1;
-const DEAD_ZONE = 0.12; // of a stick that is let go
-/** Buttons of the standard layout: the lower face button, the shoulders. */
-const PAD = { press: 0, turn: 4, fine: 5 } as const;
 const GATE = 0.006; // [m] beside the line of the approach from which on the way leads along it
 const LEAVE = 0.02; // [m] beside it from which on the way leads to its begin again
 
-const toVector = (v: ArrayLike<number>): Vector3 => new Vector3(v[0], v[1], v[2]);
-const toQuaternion = ({ q }: Pose): Quaternion => new Quaternion(q[0], q[1], q[2], q[3]);
 const copy = ({ p, q }: Place): Place => ({ p: p.clone(), q: q.clone() });
 
 /** Where the step wants what the hand moves; `farther`: [m] away from the viewer. */
@@ -228,7 +225,7 @@ export class Hand {
   private centreAt(place: Place | undefined): Vector3 | undefined {
     const { now } = this;
     if (now === undefined || place === undefined) return undefined;
-    const centre = toVector(this.session.objects.get(now.objectId)?.centre ?? [0, 0, 0]).applyQuaternion(now.object.q).add(now.object.p);
+    const centre = vectorOf(this.session.objects.get(now.objectId)?.centre ?? [0, 0, 0]).applyQuaternion(now.object.q).add(now.object.p);
     return centre.sub(now.proxy.p).applyQuaternion(now.proxy.q.clone().invert()).applyQuaternion(place.q).add(place.p);
   }
   /** Of the step, if it is about what this hand holds. */
@@ -249,9 +246,9 @@ export class Hand {
       return { from, to, distance: off.length(), farther: off.dot(this.view.axes().away), angle };
     };
     if (goal !== undefined) {
-      const q_WG = toQuaternion(goal);
-      const to = toVector(session.objects.get(step.object_id)?.centre ?? [0, 0, 0]).applyQuaternion(q_WG).add(toVector(goal.p));
-      const way = toVector(step.approach_W);
+      const q_WG = quaternionOf(goal.q);
+      const to = vectorOf(session.objects.get(step.object_id)?.centre ?? [0, 0, 0]).applyQuaternion(q_WG).add(vectorOf(goal.p));
+      const way = vectorOf(step.approach_W);
       const off = from.clone().sub(to);
       const beside = off.clone().addScaledVector(way, -off.dot(way)).length();
       const isOnWay = step.approach_distance === 0 || beside < (this.wayOf === step.revision ? LEAVE : GATE) || off.length() < GATE;
@@ -260,7 +257,7 @@ export class Hand {
     }
     const touch = session.states.get(step.touch_id);
     if (step.touch_id === NONE || touch === undefined || session.isOwn(step.touch_id)) return undefined;
-    return guide(toVector(session.objects.get(step.touch_id)?.centre ?? [0, 0, 0]).applyQuaternion(toQuaternion(touch.X_WO)).add(toVector(touch.X_WO.p)));
+    return guide(vectorOf(session.objects.get(step.touch_id)?.centre ?? [0, 0, 0]).applyQuaternion(quaternionOf(touch.X_WO.q)).add(vectorOf(touch.X_WO.p)));
   }
 
   private tick(): void {
@@ -295,22 +292,18 @@ export class Hand {
 
   /** The sticks of the first gamepad: left right and up, away; with the left shoulder they turn. */
   private applyGamepad(seconds: number): void {
-    const pad = navigator.getGamepads().find((known) => known !== null);
-    if (pad === undefined || pad === null) return;
-    const isDown = (button: number): boolean => pad.buttons[button]?.pressed === true;
-    if (isDown(PAD.press) && !this.wasPadPressed) {
+    const pad = motionOfPad();
+    if (pad === undefined) return;
+    if (pad.isPressed && !this.wasPadPressed) {
       if (this.isOn) this.align();
       else this.press();
     }
-    this.wasPadPressed = isDown(PAD.press);
-    const [x, y, , depth] = [0, 1, 2, 3].map((axis) => {
-      const value = pad.axes[axis] ?? 0;
-      return Math.abs(value) < DEAD_ZONE ? 0 : value;
-    });
-    if (x === 0 && y === 0 && depth === 0) return;
-    const scale = seconds * (this.isFine || isDown(PAD.fine) ? FINE : 1);
-    if (isDown(PAD.turn) || this.isTurning) this.turn(y * KEY_TURN * scale, x * KEY_TURN * scale, -depth * KEY_TURN * scale);
-    else this.go(x * scale, -y * scale, -depth * scale);
+    this.wasPadPressed = pad.isPressed;
+    const scale = seconds * (this.isFine || pad.isFine ? FINE : 1);
+    const [right, up, away] = [pad.right, pad.up, pad.away].map((part) => part * scale);
+    if (right === 0 && up === 0 && away === 0) return;
+    if (pad.isTurning || this.isTurning) this.turn(-up * KEY_TURN, right * KEY_TURN, away * KEY_TURN);
+    else this.go(right, up, away);
   }
 
   /** Eases the orientation of the part to the ghost's. */
@@ -322,10 +315,10 @@ export class Hand {
       return;
     }
     const q_HO = this.now.proxy.q.clone().invert().multiply(this.now.object.q);
-    const off = toQuaternion(goal).multiply(target.q.clone().multiply(q_HO).invert());
+    const off = quaternionOf(goal.q).multiply(target.q.clone().multiply(q_HO).invert());
     const angle = 2 * Math.acos(Math.min(1, Math.abs(off.w)));
     if (angle > ALIGNED) this.turnBy(new Quaternion().slerp(off, Math.min(1, (ALIGN_TURN * seconds) / angle)));
-    const left = this.now.object.q.angleTo(toQuaternion(goal));
+    const left = this.now.object.q.angleTo(quaternionOf(goal.q));
     if ((angle <= ALIGNED && left < 2 * ALIGNED) || this.alignment.isBlocked(left)) this.aligning = false;
   }
 
@@ -373,7 +366,10 @@ export class Hand {
   };
 
   private onDown = (event: PointerEvent): void => {
-    if (event.button !== 0 || this.drag !== undefined || !event.isPrimary) return;
+    // a second finger turns the view: the hand stays, also when one of them is lifted
+    const isSecond = !event.isPrimary || (this.drag !== undefined && this.drag.pointer !== event.pointerId);
+    if (isSecond) this.drag = undefined;
+    if (isSecond || event.button !== 0) return;
     this.drag = { pointer: event.pointerId, x: event.clientX, y: event.clientY };
     this.aligning = false;
   };

@@ -38,7 +38,7 @@ export class Headset {
       ended();
     });
     try {
-      await view.enterHeadset(session, (frame, space) => headset.follow(frame, space));
+      await view.headset.enter(session, (frame, space) => headset.follow(frame, space));
     } catch (problem) {
       await session.end().catch(() => undefined);
       throw problem;
@@ -51,7 +51,7 @@ export class Headset {
     for (const name of ["selectstart", "squeezestart"] as const) session.addEventListener(name, this.onGrasp);
     for (const name of ["selectend", "squeezeend"] as const) session.addEventListener(name, this.onRelease);
     session.addEventListener("inputsourceschange", ({ removed }) => removed.forEach((source) => this.forget(source)));
-    view.rig.add(this.card.group);
+    view.headset.rig.add(this.card.group);
   }
 
   end(): void {
@@ -68,10 +68,10 @@ export class Headset {
     for (const { index } of this.grasps.values()) this.hand.release(index);
     for (const source of this.pointers.keys()) this.forget(source);
     this.hand.isWatched = undefined;
-    this.view.rig.remove(this.card.group);
+    this.view.headset.rig.remove(this.card.group);
     release(this.card.group);
     this.card.dispose();
-    this.view.leaveHeadset();
+    this.view.headset.leave();
   }
 
   private forget(source: XRInputSource): void {
@@ -81,7 +81,7 @@ export class Headset {
     this.pressed.delete(source);
     const pointer = this.pointers.get(source);
     if (pointer !== undefined) {
-      this.view.rig.remove(pointer);
+      this.view.headset.rig.remove(pointer);
       release(pointer);
     }
     this.pointers.delete(source);
@@ -89,7 +89,7 @@ export class Headset {
 
   /** Trigger, grip or pinch: takes the hand, presses what it points at, or arms a station that is off. */
   private onGrasp = ({ inputSource: source, frame }: XRInputSourceEvent): void => {
-    const ray = this.view.poseIn(frame, source.targetRaySpace);
+    const ray = this.view.headset.poseIn(frame, source.targetRaySpace);
     if (ray !== undefined && this.card.isStopAt(ray)) return this.raise();
     if (!this.hand.isOn) return this.hand.press();
     const index = this.handOf(source.handedness);
@@ -113,7 +113,7 @@ export class Headset {
     for (const source of this.session.inputSources) {
       const own = frame.getPose(source.gripSpace ?? source.targetRaySpace, space);
       this.show(source, own);
-      const place = this.view.poseIn(frame, source.gripSpace ?? source.targetRaySpace);
+      const place = this.view.headset.poseIn(frame, source.gripSpace ?? source.targetRaySpace);
       const grasp = this.grasps.get(source);
       if (grasp !== undefined) this.carry(grasp, place);
       this.pressButtons(source);
@@ -155,7 +155,7 @@ export class Headset {
     if (pointer === undefined) {
       pointer = new THREE.Mesh(new THREE.ConeGeometry(0.012, 0.06, 12).rotateX(-Math.PI / 2), new THREE.MeshBasicMaterial({ color: 0x8fa3b5, transparent: true, opacity: 0.7 }));
       this.pointers.set(source, pointer);
-      this.view.rig.add(pointer);
+      this.view.headset.rig.add(pointer);
     }
     pointer.visible = pose !== undefined;
     if (pose === undefined) return;

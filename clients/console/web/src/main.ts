@@ -1,29 +1,37 @@
 import "./style.css";
 
 import { FRAME, playsBeside, showBeside, tellBeside, type Played } from "./beside";
-import { coverOf, isEmpty, isSilent, linkBadge, PROTOCOL, type Opening, type Standing } from "./cover";
-import { Desk, PASS } from "./desk";
+import { coverOf, isElsewhere, isEmpty, isHeard, isSilent, linkBadge, PROTOCOL, stopOf, type Opening, type Standing } from "./cover";
+import { Desk } from "./desk";
+import { Dialog } from "./dialog";
 import { h, icon, marked, renew } from "./dom";
+import { showKeys } from "./help";
 import { addressOf, LiveSource, type LiveState } from "./live";
 import { Lobby } from "./lobby";
 import type { Gateway, LobbyState } from "./messages";
 import { Labels } from "./labels";
+import {
+  all, app, card, cover, fileButton, fileInput, helpButton, languages, legend, link, noForce, note, plotHost, sections, setWordsOfElements, showElements, showTab, stage, status,
+  strip, stripText, themeButton, time, title,
+} from "./layout";
 import * as panels from "./panels";
 import { Part } from "./part";
+import { Picture } from "./picture";
 import { Plots } from "./plot";
 import { Player } from "./player";
 import { fromAddress, fromFile, Recording } from "./recording";
 import { SceneView } from "./scene";
 import { Session, TOPICS } from "./session";
 import { ViewTools } from "./viewtools";
-import { keep, kept, language, languageNames, nameOfLanguage, setLanguage, t, type Key } from "./strings";
+import { clock, keep, kept, language, setLanguage, t } from "./strings";
 
 const PANEL_PERIOD = 100; // ms
+const SOUGHT_PERIOD = 300; // [ms] likewise, while one place after the other is sought
 
 // ?picture is nothing but the scene: of it `tenon picture` makes its pictures, and waits until it is complete
 const wanted = new URLSearchParams(location.search);
 const isPicture = wanted.has("picture");
-const SETTLED = 1000; // [ms] without a change
+const DESCRIBED = 1000; // [ms] after which the page draws without a word of the gateway
 const ADDRESS = "file"; // of a recording, in the page's own address
 
 // asked for before all that takes its time
@@ -47,52 +55,8 @@ const theme = (isPicture ? null : kept("theme")) ?? (matchMedia("(prefers-color-
 document.documentElement.dataset["theme"] = theme;
 document.documentElement.classList.toggle("picture", isPicture);
 
-const title = h("span", "title");
-const link = h("span", "badge info");
-const time = h("time", "clock");
-const languages = h("select", "");
-const themeButton = h("button", "");
-const strip = h("div", "strip");
-const stage = h("main", "stage");
-const card = h("section", "card");
-const cover = h("div", "cover");
-cover.setAttribute("role", "status");
-const legend = h("div", "legend");
-const note = h("p", "note");
-const status = h("footer", "status");
-const sections = {
-  steps: { head: h("h2"), body: h("div", "body") },
-  plots: { head: h("h2"), body: h("div", "body plot") },
-  people: { head: h("h2"), body: h("div", "body") },
-  events: { head: h("h2"), body: h("div", "body") },
-};
-const noForce = h("p", "muted");
-const plotHost = h("div");
-sections.plots.body.append(noForce, plotHost);
-sections.plots.body.tabIndex = 0;
-const side = h("aside", "side");
-for (const [name, { head, body }] of Object.entries(sections)) {
-  // scrolled by keys, too
-  body.tabIndex = 0;
-  body.setAttribute("role", "group");
-  side.append(h("section", `panel panel-${name}`, head, body));
-}
-const tabs = h("nav", "tabs");
-const tabButtons = (["steps", "plots", "people"] as const).map((name) => {
-  const button = h("button", "");
-  button.addEventListener("click", () => showTab(name));
-  tabs.append(button);
-  return { name, button };
-});
-stage.append(card, legend, note, cover);
-const brand = h("span", "brand", "Tenon");
-const all = Object.assign(h("a", "all"), { href: "/", hidden: true });
-const stripText = h("span", "strip-text");
-const top_ = h("header", "top", brand, all, title, h("span", "grow"), time, link, languages, themeButton);
-const app = document.getElementById("app") as HTMLElement;
-app.append(top_, strip, stage, tabs, side, status);
-strip.append(stripText);
-stripText.setAttribute("role", "status");
+const keysDialog = new Dialog(() => void desk?.raise());
+showElements();
 
 // ---- the scene and the plot
 let view: SceneView | undefined;
@@ -102,45 +66,36 @@ try {
 } catch (problem) {
   console.warn(problem);
 }
+const picture = isPicture ? new Picture(session, () => ({ over: coverOf(standing()), view, isReading: player?.isReading === true }), wanted.has("near") ? () => tools?.showWork() : undefined) : undefined;
 const tools = view === undefined ? undefined : new ViewTools(view, session);
 if (view !== undefined && tools !== undefined) {
   const labels = new Labels(view);
   labels.from(() => tools.labels());
   labels.from(() => (isPicture ? [] : panels.holders(session)));
   view.canvas.after(labels.element);
+  view.headset.onFrame = tick;
   stage.append(tools.element);
 }
 const plots = new Plots(plotHost, noForce);
 sections.plots.head.after(plots.choice);
+sections.plots.body.addEventListener("keydown", (event) => {
+  const direction = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+  if (direction === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
+  plots.moveCursor(direction * (event.shiftKey ? 5 : 1));
+  // it moves neither the hand nor the view as well
+  event.preventDefault();
+  event.stopPropagation();
+});
 
 // ---- words, light and dark
-function showTab(name: string): void {
-  side.dataset["tab"] = name;
-  for (const tab of tabButtons) tab.button.setAttribute("aria-pressed", String(tab.name === name));
-}
-
 function setWords(): void {
-  const heads: [HTMLElement, Key][] = [
-    [sections.steps.head, "steps"], [sections.plots.head, "plots"], [sections.people.head, "people"], [sections.events.head, "events"],
-    [noForce, "force.none"],
-  ];
   desk?.setWords();
   part?.setWords();
   player?.setWords();
   lobby?.setWords();
   tools?.setWords();
-  for (const [element, key] of heads) element.textContent = t(key);
+  setWordsOfElements();
   all.textContent = t(wanted.has(ADDRESS) || opening !== undefined || player !== undefined ? "file.leave" : "lobby.all");
-  for (const { head, body } of Object.values(sections)) body.setAttribute("aria-label", head.textContent);
-  for (const { name, button } of tabButtons) button.textContent = t(`tab.${name}`);
-  legend.replaceChildren(
-    ...(["target", "within", "device", "contact", "workspace"] as const).map((name) => h("span", `key-${name}`, h("i"), t(`legend.${name}`))),
-  );
-  languages.replaceChildren(...languageNames.map((name) => Object.assign(h("option", "", nameOfLanguage(name)), { value: name, selected: name === language })));
-  themeButton.replaceChildren(icon("half"));
-  themeButton.setAttribute("aria-label", t("theme"));
-  themeButton.title = t("theme");
-  languages.setAttribute("aria-label", t("language"));
   note.textContent = view?.parts.areBoxes === true ? t("view.boxes") : view?.simple === true ? t("view.simple") : "";
   view?.setLabel(t("view.label"));
   plots.rebuild();
@@ -159,10 +114,18 @@ languages.addEventListener("change", () => {
   setLanguage(languages.value);
   setWords();
 });
+const showHelp = (): void => showKeys(keysDialog, { plays: player !== undefined, hasHand: part !== undefined });
+helpButton.addEventListener("click", showHelp);
+fileButton.addEventListener("click", () => fileInput.click());
+fileInput.addEventListener("change", () => {
+  const file = fileInput.files?.[0];
+  fileInput.value = ""; // the same one once more is a choice, too
+  if (file !== undefined) drop(file);
+});
 themeButton.addEventListener("click", () => setTheme(document.documentElement.dataset["theme"] === "light" ? "dark" : "light"));
 addEventListener("keydown", (event) => {
   const isText = (event.target instanceof HTMLInputElement && !["range", "checkbox", "radio", "button"].includes(event.target.type)) || event.target instanceof HTMLTextAreaElement;
-  if (isText || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (isReplaced || isText || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === " ") {
     // the stop comes before whatever has the focus: a list, a slider, a dialog
     event.preventDefault();
@@ -173,6 +136,7 @@ addEventListener("keydown", (event) => {
   if (event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement || document.querySelector("dialog[open]") !== null) return;
   if (part?.onKeyDown(event) === true || (lobby === undefined && tools?.onKeyDown(event) === true)) return;
   if (event.key === "r") view?.frame();
+  if (event.key === "?") showHelp();
   if (event.key === "l") themeButton.click();
   if (event.key === ",") player?.step(-1);
   if (event.key === ".") player?.step(1);
@@ -203,11 +167,14 @@ sections.events.body.addEventListener("click", (event) => {
 
 // ---- showing it
 let age = 0; // s since the last message
-const standing = (): Standing => ({ isDropping, opening, player, lobby, live, session, view, age });
+const chosen = wanted.get("session") ?? "";
+let only = ""; // what this gateway shows, where that is one session or recording
+const standing = (): Standing => ({ isDropping, opening, player, lobby, live, session, view, chosen, only, age, silence: source?.silence ?? 0 });
 let shown = "";
 let shownAt = 0;
+let sought = 0; // places of a recording, when the last picture was drawn
 
-/** Changes only what is another, so that nothing is read out, loses its focus or a press without reason. */
+/** Updates only the nodes that differ: keeps focus, presses and screen-reader output. */
 function show(element: HTMLElement, nodes: Node[]): void {
   const before = element.querySelector("[aria-current]");
   renew(element, nodes);
@@ -222,19 +189,17 @@ function toCurrent(element: HTMLElement): void {
 }
 new ResizeObserver(() => toCurrent(sections.steps.body)).observe(sections.steps.body);
 
-function showPanels(sinceLast: number): void {
-  age = sinceLast;
-  const silent = isSilent(standing());
+function showPanels(): void {
   const [key, name, tone] = linkBadge(standing());
   link.className = `badge ${tone}`;
   show(link, [icon(name), document.createTextNode(t(key))]);
-  title.textContent = lobby !== undefined ? "" : [session.link?.title || t("title.none"), fileName].filter((text) => text !== "").join(" · ");
-  document.title = session.link?.title ? `${session.link.title} – Tenon` : "Tenon";
-  time.textContent = panels.clock(session.tick / 1000);
-  const { text, isRaised } = panels.strip(session);
-  strip.className = isRaised ? "strip raised" : "strip";
-  strip.hidden = (player !== undefined || opening !== undefined) && !isRaised;
-  show(stripText, lobby !== undefined || session.objects.size === 0 ? [] : silent && !isRaised ? [icon("warn"), document.createTextNode(t("stop.unknown"))] : [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
+  title.textContent = lobby !== undefined ? "" : [session.title || t("title.none"), fileName].filter((text) => text !== "").join(" · ");
+  document.title = session.title !== "" ? `${session.title} – Tenon` : "Tenon";
+  time.textContent = clock(session.tick / 1000);
+  const stop = stopOf(standing());
+  strip.className = stop === undefined || stop.state === "none" ? "strip" : `strip ${stop.state}`;
+  strip.hidden = (player !== undefined || opening !== undefined) && stop?.state !== "raised";
+  show(stripText, stop === undefined ? [] : [icon(stop.icon), document.createTextNode(stop.text)]);
   desk?.show();
   part?.show();
   const whyNoSteps = desk?.whyNot("goto");
@@ -244,7 +209,7 @@ function showPanels(sinceLast: number): void {
   // a seek begins with nothing known: a row that it brings back keeps its focus
   if (player?.isReading !== true) {
     show(sections.steps.body, panels.steps(session, app.classList.contains("leads")));
-    show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName, whyNoTaking: whyNoTaking && t(whyNoTaking) }));
+    show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName, self: desk?.client, whyNoTaking: whyNoTaking && t(whyNoTaking) }));
     show(sections.events.body, panels.events(session, player !== undefined));
   }
   show(status, panels.status(session, age));
@@ -252,7 +217,7 @@ function showPanels(sinceLast: number): void {
   cover.hidden = over === undefined;
   cover.className = `cover${over?.covers === true ? " full" : ""}${over?.icon === "warn" ? " warns" : ""}`;
   cover.dataset["state"] = over?.state ?? "none";
-  show(cover, over === undefined ? [] : [h("div", "", icon(over.icon), h("h2", "", over.head), h("p", "", ...marked(over.more)), ...(over.command ? [h("code", "", over.command)] : []))]);
+  show(cover, over === undefined ? [] : [h("div", "", icon(over.icon), h("h2", "", over.head), h("p", "", ...marked(over.more)), ...(over.command ? [h("code", "", over.command)] : []), ...(over.leads === undefined ? [] : [Object.assign(h("a", "", over.leads), { href: "/" })]))]);
   const isBlank = isEmpty(over, standing());
   app.classList.toggle("blank", isBlank);
   time.hidden = isBlank || lobby !== undefined || player !== undefined; // a player has its own
@@ -261,7 +226,7 @@ function showPanels(sinceLast: number): void {
   card.hidden = legend.hidden = !hasSession;
   const workspaceKey = legend.querySelector<HTMLElement>(".key-workspace");
   if (workspaceKey !== null) workspaceKey.hidden = view?.hasWorkspace !== true;
-  document.body.classList.toggle("stale", player === undefined && (live.kind !== "open" || session.link?.state === "lost" || silent));
+  document.body.classList.toggle("stale", player === undefined && (live.kind !== "open" || session.link?.state === "lost" || isSilent(standing())));
   view?.setCover(card.hidden || isPicture ? undefined : card);
 }
 
@@ -269,40 +234,32 @@ let isReplaced = false; // by two pages beside each other
 
 function frame(now: number): void {
   if (isReplaced) return;
-  const sinceLast = session.heard === 0 || player !== undefined ? 0 : (now - session.heard) / 1000;
-  player?.update(now);
-  lobby?.update(now);
-  tools?.update();
-  if (lobby === undefined) view?.update(session, now);
-  if (isPicture) picture(now);
-  plots.update(session, now);
-  const hand = part?.hand;
-  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${JSON.stringify(live)} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${player?.isReading} ${view?.hasWorkspace} ${sinceLast > 0.5 ? sinceLast.toFixed(1) : ""}`;
-  if (now - shownAt >= PANEL_PERIOD && state !== shown) {
-    shownAt = now;
-    shown = state;
-    showPanels(sinceLast);
-  }
+  if (view?.headset.isDriving !== true) tick(now);
   requestAnimationFrame(frame);
 }
 
-let settled = 0;
-let told = "";
-
-/** Says when the picture is complete, or why it cannot be. */
-function picture(now: number): void {
-  const over = coverOf(standing());
-  const { dataset } = document.body;
-  if (over !== undefined && ["file", "refused", "webgl", "protocol", "lost"].includes(over.state)) dataset["picture"] = `${over.head}: ${over.more}`;
-  const state = `${session.objects.size} ${session.step?.revision} ${view?.models} ${player?.isReading}`;
-  if (view?.isComplete !== true || player?.isReading === true || state !== told) settled = now;
-  told = state;
-  if (now - settled < SETTLED) return;
-  if (wanted.has("near") && session.step !== undefined && dataset["near"] === undefined) {
-    dataset["near"] = "";
-    tools?.showWork();
-    settled = now;
-  } else dataset["picture"] = "ready";
+/** Once for each frame of the window, or of a headset that draws. */
+function tick(now: number): void {
+  age = session.heard === 0 || session.isWaiting || player !== undefined ? 0 : (now - session.heard) / 1000;
+  player?.update(now);
+  lobby?.update(now);
+  if (lobby !== undefined) desk?.renewAlarm();
+  picture?.update(now);
+  if (player?.isReading === true) return; // what is known of the place that is sought is not whole
+  tools?.update(now);
+  if (lobby === undefined) view?.update(session, now);
+  // of a place that was just sought the scene comes first, the rest with the next pictures; in a drag now and then
+  const isFresh = player !== undefined && player.sought !== sought;
+  sought = player?.sought ?? 0;
+  if (isFresh && now - shownAt < SOUGHT_PERIOD) return;
+  plots.update(session, now);
+  const hand = part?.hand;
+  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${JSON.stringify(live)} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${player?.isReading} ${view?.hasWorkspace} ${age > 0.5 ? age.toFixed(1) : ""} ${isHeard(standing())}`;
+  if (now - shownAt >= PANEL_PERIOD && state !== shown) {
+    shownAt = now;
+    shown = state;
+    showPanels();
+  }
 }
 
 // ---- where the session comes from
@@ -316,20 +273,22 @@ function follow(room: string, { role, recordings, local }: Gateway): void {
       void desk?.takeSeatAgain();
     }
     joined = isJoined;
-    if (topic === "EmergencyStop" || topic === "EmergencyClear" || topic === "RunState") desk?.hearStop();
+    if (topic === "EmergencyStop" || topic === "EmergencyClear" || topic === "NewestRaise" || topic === "RunState") desk?.hearStop();
   }, (state) => {
     live = state;
     if (state.kind !== "reconnecting") return;
     joined = false;
     desk?.loseSeat();
-    part?.end();
+    part?.lose();
   });
   desk = new Desk(source, session, role);
   desk.canRecord = recordings === true;
+  desk.isHeard = () => isHeard(standing());
   const { notify } = desk;
   if (view !== undefined) {
-    part = new Part(source, session, view, () => sessionStorage.getItem(PASS) ?? "", (isGood, text) => notify.call(desk, isGood, text), () => void desk?.raise());
+    part = new Part(source, session, view, (isGood, text) => notify.call(desk, isGood, text), () => void desk?.raise());
     part.isLocal = local === true;
+    part.canClear = () => desk?.canClear === true;
     part.alarm = () => desk?.alarmText ?? "";
     part.onLoss = (reason, again) => desk?.offer("hand", t("part.lost", { reason }), t("part.take.again"), again);
     part.onTaken = () => desk?.withdraw("hand");
@@ -353,6 +312,7 @@ function showLobby(role: string): void {
     live = state;
   });
   desk = new Desk(source, session, role, true);
+  desk.unstopped = () => lobby?.unstopped ?? [];
   strip.prepend(desk.alarm);
   strip.append(desk.stop);
   stage.append(desk.notices);
@@ -366,7 +326,7 @@ async function play(file: Played): Promise<void> {
   part?.remove();
   desk?.end();
   lobby?.end();
-  player?.element.remove();
+  player?.end();
   [source, desk, part, lobby, player] = [undefined, undefined, undefined, undefined, undefined];
   app.classList.remove("shows-lobby");
   opening = { fraction: 0 };
@@ -376,19 +336,22 @@ async function play(file: Played): Promise<void> {
   setWords();
   session.forget();
   try {
-    const recording = await Recording.open(file instanceof File ? fromFile(file) : await fromAddress(file ?? "/recording.mcap"), (topic, message, isGone) => session.receive(topic, message, isGone), (fraction) => mine === opens && (opening = { fraction }));
+    const recording = await Recording.open(file instanceof File ? fromFile(file) : await fromAddress(file ?? "/recording.mcap"), (topic, message, isGone) => mine === opens && session.receive(topic, message, isGone), (fraction) => mine === opens && (opening = { fraction }));
     if (mine !== opens) return;
-    player = new Player(recording, session, (name) => panels.titleOfStep([...session.sceneSteps.values()].find((step) => step.name === name) ?? { name, title: [] }));
+    player = new Player(recording, session);
     status.before(player.element);
     if (wanted.has(FRAME)) player.onCommand = tellBeside;
     else player.allowCompare((other) => {
       isReplaced = true;
-      view?.end();
-      showBeside(app, file, other);
+      showBeside(app, file, other, () => {
+        isReplaced = false;
+        requestAnimationFrame(frame);
+      });
     });
     opening = undefined;
-    const start = wanted.get("t") === "end" ? player.recording.seconds : Number(wanted.get("t") ?? 0);
-    if (start > 0) player.seek(start);
+    const start = wanted.get("t");
+    if (start === "end") player.seek(player.recording.seconds);
+    else if (start !== null && Number.isFinite(Number(start))) player.seekTick(1000 * Number(start) || 1); // the first tick
   } catch (problem) {
     if (mine !== opens) return;
     opening = { fraction: 0, problem: problem instanceof Error ? problem.message : String(problem) };
@@ -398,15 +361,16 @@ async function play(file: Played): Promise<void> {
 
 async function begin(): Promise<void> {
   const gateway = (await described) ?? { session: "", recording: "", role: "", protocol: PROTOCOL };
-  const chosen = wanted.get("session");
   ownFile = gateway.recording;
+  only = gateway.session || gateway.recording;
   app.classList.toggle("framed", wanted.has(FRAME));
-  all.hidden = chosen === null || gateway.session !== "";
+  all.hidden = chosen === "" || gateway.session !== "";
   if (wanted.has(FRAME)) playsBeside((file) => void play(file), () => player);
   else if (wanted.has(ADDRESS)) await play(wanted.get(ADDRESS) ?? "");
+  else if (isElsewhere(standing())) return;
   else if (gateway.recording !== "") await play(undefined);
-  else if (gateway.session === "" && chosen === null) showLobby(gateway.role);
-  else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen ?? "")}` : "/live", gateway);
+  else if (gateway.session === "" && chosen === "") showLobby(gateway.role);
+  else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen)}` : "/live", gateway);
 }
 
 for (const name of ["dragover", "dragleave", "drop"] as const)
@@ -414,13 +378,22 @@ for (const name of ["dragover", "dragleave", "drop"] as const)
     event.preventDefault();
     isDropping = name === "dragover" && event.dataTransfer?.types.includes("Files") === true;
     const file = name === "drop" ? event.dataTransfer?.files[0] : undefined;
-    if (file !== undefined) void play(file);
+    if (file !== undefined && !isReplaced) drop(file);
   });
+
+/** A file must not end a session by mistake. */
+function drop(file: File): void {
+  const isRecording = file.name.toLowerCase().endsWith(".mcap");
+  if (desk === undefined) void play(file);
+  else if (!isRecording) desk.notify(false, t("drop.refused", { name: file.name }));
+  else if (desk.role !== "" || part?.hand !== undefined) desk.askToLeave(file.name, () => void play(file));
+  else void play(file);
+}
 
 setWords();
 showTab("steps");
-showPanels(0);
+showPanels();
 // for tests, and for whoever wants to look
 Object.assign(window, { tenon: { session, view, player } });
 void begin();
-void Promise.race([described, new Promise((done) => setTimeout(done, SETTLED))]).then(() => requestAnimationFrame(frame)); // the session is asked for before anything is drawn
+void Promise.race([described, new Promise((done) => setTimeout(done, DESCRIBED))]).then(() => requestAnimationFrame(frame)); // the session is asked for before anything is drawn

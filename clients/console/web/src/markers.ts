@@ -1,7 +1,8 @@
 // What is drawn beside the parts: devices, contacts with their forces, the way of the hand, the approach. World frame, metres.
 import * as THREE from "three";
 
-import { NONE, StepPhase, type Pose } from "./messages";
+import { NONE, StepPhase } from "./messages";
+import { place, quaternionOf, vectorOf } from "./pose";
 import { release } from "./release";
 import type { Session } from "./session";
 
@@ -14,11 +15,6 @@ const TACTORS = 6; // about a forearm, whose x goes from elbow to wrist: the fir
 const RED = new THREE.Color(0xd55e00);
 const GREY = new THREE.Color(0x52606d);
 const OPEN = { depthTest: false, transparent: true } as const; // seen through parts
-
-export function place(target: THREE.Object3D, pose: Pose): void {
-  target.position.set(pose.p[0], pose.p[1], pose.p[2]);
-  target.quaternion.set(pose.q[0], pose.q[1], pose.q[2], pose.q[3]);
-}
 
 const FULL = 1; // [m] of a larger workspace, as that of a mouse, there is no limit to be seen
 const NEAR = 0.7; // of its radius, from which on the limit of a workspace shows
@@ -117,12 +113,11 @@ export class Markers {
     const object = step === undefined ? undefined : session.objects.get(step.object_id);
     this.approach.visible = step !== undefined && object !== undefined && step.has_target && step.approach_distance > 0 && step.phase <= StepPhase.Active && !session.isOver;
     if (!this.approach.visible || step === undefined || object === undefined) return;
-    const [p, q, c, way] = [step.X_WG.p, step.X_WG.q, object.centre, step.approach_W];
-    const end = new THREE.Vector3(c[0], c[1], c[2]).applyQuaternion(new THREE.Quaternion(q[0], q[1], q[2], q[3])).add(new THREE.Vector3(p[0], p[1], p[2]));
+    const end = vectorOf(object.centre).applyQuaternion(quaternionOf(step.X_WG.q)).add(vectorOf(step.X_WG.p));
     const length = step.approach_distance;
     const head = 0.03 * this.size;
     this.approach.position.copy(end);
-    this.approach.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(way[0], way[1], way[2]));
+    this.approach.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), vectorOf(step.approach_W));
     this.shaft.scale.set(this.size, Math.max(1e-3, length - head), this.size);
     this.shaft.position.y = -(length + head) / 2;
     this.tip.scale.setScalar(this.size);
@@ -153,10 +148,8 @@ export class Markers {
       shown.link.visible = state !== undefined;
       if (grab === undefined || state === undefined) continue;
       // X_WH' = X_WO X_HO^-1: where the hand is at the object
-      const q_WO = new THREE.Quaternion(state.X_WO.q[0], state.X_WO.q[1], state.X_WO.q[2], state.X_WO.q[3]);
-      const q_OH = new THREE.Quaternion(grab.X_HO.q[0], grab.X_HO.q[1], grab.X_HO.q[2], grab.X_HO.q[3]).invert();
-      const proxy = new THREE.Vector3(grab.X_HO.p[0], grab.X_HO.p[1], grab.X_HO.p[2]).applyQuaternion(q_OH).negate().applyQuaternion(q_WO);
-      proxy.add(new THREE.Vector3(state.X_WO.p[0], state.X_WO.p[1], state.X_WO.p[2]));
+      const q_OH = quaternionOf(grab.X_HO.q).invert();
+      const proxy = vectorOf(grab.X_HO.p).applyQuaternion(q_OH).negate().applyQuaternion(quaternionOf(state.X_WO.q)).add(vectorOf(state.X_WO.p));
       const ends = shown.link.geometry.getAttribute("position") as THREE.BufferAttribute;
       ends.setXYZ(0, proxy.x, proxy.y, proxy.z);
       ends.setXYZ(1, hand.X_WH.p[0], hand.X_WH.p[1], hand.X_WH.p[2]);
@@ -184,7 +177,7 @@ export class Markers {
       const opacity = this.showsWorkspaces ? 0.45 + 0.5 * near : 0.95 * near;
       shown.visible = opacity > 0.02;
       shown.material.uniforms["opacity"].value = opacity;
-      shown.position.set(p_WC[0], p_WC[1], p_WC[2]);
+      shown.position.copy(vectorOf(p_WC));
       shown.scale.setScalar(radius);
     }
   }
@@ -205,12 +198,12 @@ export class Markers {
         this.tactors.set(id, bracelet);
         this.scene.add(...bracelet);
       }
-      const q = new THREE.Quaternion(X.q[0], X.q[1], X.q[2], X.q[3]);
+      const q = quaternionOf(X.q);
       const { size, centre } = object;
       bracelet.forEach((motor, i) => {
         const [angle, strength] = [(i * Math.PI) / 3, hand.tactors[i] / 255];
         motor.position.set(centre[0] + 0.3 * size[0], centre[1] + 0.5 * size[1] * Math.sin(angle), centre[2] + 0.5 * size[2] * Math.cos(angle));
-        motor.position.applyQuaternion(q).add(new THREE.Vector3(X.p[0], X.p[1], X.p[2]));
+        motor.position.applyQuaternion(q).add(vectorOf(X.p));
         motor.scale.setScalar(1 + strength);
         motor.material.color.copy(GREY).lerp(RED, strength);
       });
@@ -229,7 +222,7 @@ export class Markers {
       this.contacts.setMatrixAt(count, matrix);
       this.contacts.setColorAt(count, color.setHex(COLORS.shallow).lerp(deep, Math.min(1, pair.peak_depth / DEEP)));
       ++count;
-      const force = new THREE.Vector3(pair.F_Ao_W.force[0], pair.F_Ao_W.force[1], pair.F_Ao_W.force[2]);
+      const force = vectorOf(pair.F_Ao_W.force);
       const newtons = force.length();
       if (newtons < 0.1) continue;
       if (this.arrows[arrows] === undefined) {
@@ -243,7 +236,7 @@ export class Markers {
         this.scene.add(arrow);
       }
       const arrow = this.arrows[arrows++];
-      arrow.position.set(pair.p_WP[0], pair.p_WP[1], pair.p_WP[2]);
+      arrow.position.copy(vectorOf(pair.p_WP));
       arrow.setDirection(force.divideScalar(newtons));
       arrow.setLength(this.size * Math.min(LONGEST_ARROW, 0.04 + METRES_PER_NEWTON * newtons), this.size * 0.03, this.size * 0.018);
     }

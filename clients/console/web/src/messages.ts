@@ -5,6 +5,8 @@ export interface Pose { p: Vector; q: Vector }
 export interface Wrench { force: Vector; torque: Vector }
 
 export const NONE = 0xffffffff;
+/** Of a participant. */
+export enum Role { Admin, Instructor, Trainee, Observer, Recorder }
 
 export interface SceneObject {
   object_id: number; name: string; title: string; kind: string; structure_hash: string; color: string; X_WO: Pose; size: Vector; centre: Vector;
@@ -41,11 +43,15 @@ export interface StepProgress {
   conditions: { text: string; value: number; limit: number; group: number; met: boolean; depth: number }[];
 }
 export interface SceneStep { step: number; steps: number; name: string; title: Localized[]; part: string }
-export interface SceneHand { hand_id: number; name: string; role: number; object_id: number; freeze_ticks: number; park_ticks: number }
+/** Of the scenario, in all of its languages; the announcement has that of one. */
+export interface SceneTitle { titles: Localized[] }
+/** An external signal that conditions of the scenario wait for. */
+export interface SceneSignal { signal: number; name: string }
+export interface SceneHand { hand_id: number; name: string; role: Role; object_id: number; freeze_ticks: number; park_ticks: number; guidance_alone: boolean }
 export enum RunPhase { Waiting, Running, Paused, Succeeded, Failed, Stopped }
-export interface RunState { phase: RunPhase; tick: bigint; reason: string; forces_frozen?: boolean; emergency_stop?: boolean; open_commands?: number }
+export interface RunState { phase: RunPhase; tick: bigint; reason: string; forces_frozen?: boolean; emergency_stop?: boolean; open_commands?: number; steps_skipped?: number; steps_timed_out?: number }
 export interface GrabState { object_id: number; hand_id: number; epoch: number; X_HO: Pose; tick: bigint }
-export interface Presence { client_id: number; name: string; role: number; hands: ArrayLike<number>; alive: boolean }
+export interface Presence { client_id: number; name: string; role: Role; hands: ArrayLike<number>; alive: boolean }
 export interface EmergencyStop { client_guid: string; counter: number; who: string; reason: string }
 export interface EmergencyClear { client_guid: string; counter: number; who: string; reason: string }
 /** A clear names this number, and is refused when a newer raise stands. */

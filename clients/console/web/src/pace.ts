@@ -16,8 +16,7 @@ const LONGEST_AWAITED = 1500; // [ms] for models, until boxes are drawn in their
 export interface Prospect { objects: number; showsObjects: boolean; isSimple: boolean; isComplete: boolean; awaited: number }
 
 /**
- * A picture of nothing is what is behind the canvas, where the last one was not of something. Where the processor draws, each picture delays the models that are
- * being read: for a while they come first.
+ * Do not draw an empty scene first; with software rendering, wait for models up to 1.5 s.
  */
 export function isTooEarly({ objects, showsObjects, isSimple, isComplete, awaited }: Prospect): boolean {
   return objects === 0 ? !showsObjects : isSimple && !isComplete && awaited < LONGEST_AWAITED;

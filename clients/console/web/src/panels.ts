@@ -1,13 +1,12 @@
 // What stands around the scene: instruction, steps, people, events, status. Each part is made anew from the session when it changed.
 import { Vector3 } from "three";
 
-import { devicesOf } from "./desk";
 import { forbid, h, icon, type Icon } from "./dom";
-import { conditionOf, interventions, kindOf, textOf } from "./eventtext";
+import { conditionOf, interventions, kindOf, missingOf, modelOf, problemOfRecorder, textOf } from "./eventtext";
 import type { Label } from "./labels";
-import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
+import { NONE, Role, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
-import { localized, n, retold, significant, SPEAKERS, t, type Key } from "./strings";
+import { clock, localized, n, retold, significant, SPEAKERS, t, type Key } from "./strings";
 
 const RUN: Record<RunPhase, [Key, Icon, string]> = {
   [RunPhase.Waiting]: ["run.waiting", "wait", "info"],
@@ -26,12 +25,6 @@ const STEP: Record<StepPhase, [Key, Icon, string]> = {
 };
 const SINGLE = 0; // ConditionGroup of the messages: no group
 const EVENTS_SHOWN = 40;
-const TRAINEE = 2; // as in the messages
-
-export function clock(seconds: number): string {
-  const whole = Math.max(0, Math.floor(seconds));
-  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
-}
 
 /** Colour, icon and word. */
 function badge([key, name, tone]: [Key, Icon, string]): HTMLElement {
@@ -43,10 +36,12 @@ export function titleOfStep(step: { name: string; title: StepEntry["title"] }): 
   return localized(step.title) || step.name.replace(/_/g, " ");
 }
 
-export function phase({ run, isOver, isWaiting, isStopped, standing }: Session): HTMLElement | undefined {
-  if (standing.length > 0 && !isOver) return badge([isStopped ? "run.emergency" : "run.raised", "stop", "bad"]);
+export function phase({ run, isOver, isWaiting, isStopped, isRaised }: Session): HTMLElement | undefined {
+  if (isRaised && !isOver) return badge([isStopped ? "run.emergency" : "run.raised", "stop", "bad"]);
   if (isWaiting) return badge(RUN[RunPhase.Waiting]);
   if (run?.forces_frozen === true && run.phase === RunPhase.Running && !isOver) return badge(["run.frozen", "frozen", "warn"]);
+  // as endOf() of server/session/event_generator.cpp: such a run has not failed, but not everything is mounted
+  if (run?.phase === RunPhase.Succeeded && (run.steps_skipped ?? 0) + (run.steps_timed_out ?? 0) > 0) return badge(["run.ended", "over", "warn"]);
   return run === undefined ? undefined : badge(RUN[run.phase]);
 }
 
@@ -55,11 +50,17 @@ export function reasonOfEnd(session: Session): string {
   return session.run === undefined ? "" : textOf(session, { kind: "run", text: session.run.reason });
 }
 
+/** For whom it waits, where the server says so: while a stop stands it does not. */
+export function waitsFor(session: Session): string {
+  const names = /^waiting for people: (.+)$/.exec(session.run?.reason ?? "")?.[1];
+  return names === undefined ? t("run.waiting.more") : t("run.waiting.for", { missing: missingOf(session, names) });
+}
+
 export function instruction(session: Session): Node[] {
   const { step, run } = session;
   const badges = [phase(session)].filter((one) => one !== undefined);
   if (session.isOver && run !== undefined) return [h("div", "card-head", ...badges), h("p", "instruction", reasonOfEnd(session))];
-  if (session.isWaiting) return [h("div", "card-head", ...badges), h("h1", "step-title", session.link?.title ?? ""), h("p", "instruction", t("run.waiting.more"))];
+  if (session.isWaiting) return [h("div", "card-head", ...badges), h("h1", "step-title", session.title), h("p", "instruction", waitsFor(session))];
   if (step === undefined) return [h("div", "card-head", ...badges), h("p", "instruction muted", t("step.none"))];
   const count = h("span", "muted", t("step.count", { step: step.step + 1, steps: step.steps }));
   const head = h("div", "card-head", count, h("span", "part", session.retitled(step.part)), ...badges);
@@ -98,7 +99,8 @@ function conditions(session: Session): Node[] {
       rows.push(nested(depth, h("li", met ? "group met" : "group", icon(met ? "done" : "wait"), h("span", "", label), h("output", "", `${value} / ${limit}`))));
       continue;
     }
-    const reading = unit === "" ? `${significant(value)} / ${significant(limit)}` : `${n(value, 1)} / ${n(limit, 1)} ${unit}`;
+    // not evaluated yet, as under a stop: its limit is not told
+    const reading = limit === 0 && !met ? "" : unit === "" ? `${significant(value)} / ${significant(limit)}` : `${n(value, 1)} / ${n(limit, 1)} ${unit}`;
     rows.push(nested(depth, meter(label, reading, limit === 0 ? (met ? 1 : 0) : value / limit, met)));
   }
   const more = progress.nodes - progress.conditions.length;
@@ -132,13 +134,24 @@ function linkOf(session: Session, client: number): { text: string; isQuiet: bool
   const link = session.telemetry.get(client);
   if (link === undefined || link.samples === 0n) return { text: "", isQuiet: true };
   const ms = (seconds: number) => n(1000 * seconds, seconds < 0.01 ? 1 : 0);
-  const lost = n(100 * Math.max(link.inputs_lost, link.answers_lost), 1);
-  const now = t("link", { age: ms(link.age), jitter: ms(link.jitter), lost });
+  const lost = 100 * Math.max(link.inputs_lost, link.answers_lost);
+  const now = t("link", { age: ms(link.age), jitter: ms(link.jitter), lost: n(lost, 1) });
   const hands = Array.from(session.people.get(client)?.hands ?? []);
   const freeze = Math.max(0, ...hands.map((hand) => session.sceneHands.get(hand)?.freeze_ticks ?? 0));
-  const text = freeze === 0 ? now : `${now}, ${t("link.freeze", { freeze })}`;
-  const isQuiet = link.age < QUIET.age && Number(lost) < QUIET.lost && freeze <= QUIET.freeze;
+  const far = hands.some((hand) => session.sceneHands.get(hand)?.guidance_alone === true) ? `${t("link.far")}; ` : "";
+  const text = far + (freeze === 0 ? now : `${now}, ${t("link.freeze", { freeze })}`);
+  const isQuiet = far === "" && link.age < QUIET.age && lost < QUIET.lost && freeze <= QUIET.freeze;
   return { text: link.clock_known ? `${text}, ${t("link.trip", { trip: ms(link.round_trip), error: ms(link.clock_error) })}` : text, isQuiet };
+}
+
+/** The hands that somebody moves, each with its device, and the age of their contacts [ms]. */
+function devicesOf(session: Session, hands: number[]): string {
+  const names = hands.filter((hand) => hand !== NONE && !session.isTracked(hand)).map((hand) => {
+    const device = session.deviceOf(hand);
+    return device === undefined ? session.nameOfHand(hand) : `${session.nameOfHand(hand)}: ${modelOf(device)}`;
+  });
+  const ages = hands.flatMap((hand) => session.hands.get(hand)?.manifold_age ?? []).filter((age) => age !== NONE);
+  return [...names, ...(ages.length === 0 ? [] : [`${Math.max(...ages)} ms`])].join(", ");
 }
 
 /** Who holds what, at the places of the hands. */
@@ -151,11 +164,10 @@ export function holders(session: Session): Label[] {
   });
 }
 
-/** What the person at this page may do with people: remove them, and take what they hold into the hand of this name, or why not now. */
-export interface Lead { leads: boolean; hand?: string; whyNoTaking?: string }
-const OBSERVER = 3; // of the roles of messages: the console's gateway is one
+/** `self`: the client that this page is, as a seat. What the person at this page may do with people: remove them, and take what they hold into the hand of this name, or why not now. */
+export interface Lead { leads: boolean; hand?: string; whyNoTaking?: string; self?: number }
 
-export function people(session: Session, { leads, hand, whyNoTaking }: Lead): Node[] {
+export function people(session: Session, { leads, hand, whyNoTaking, self }: Lead): Node[] {
   const here = [...session.people.values()].filter((person) => person.alive).sort((a, b) => a.client_id - b.client_id);
   if (here.length === 0) return [h("p", "muted", t("people.none"))];
   const rows = here.map((person) => {
@@ -179,7 +191,7 @@ export function people(session: Session, { leads, hand, whyNoTaking }: Lead): No
     if (leads && hand !== undefined && !isOwn)
       for (const { object_id } of held) act("takeOver", session.objects.get(object_id)?.name ?? "", t("desk.takeover"), t("desk.takeover.more", { what: session.titleOf(object_id) }), undefined, whyNoTaking);
     const guided = hands.filter((id) => session.isGuided(id));
-    if (leads && person.role === TRAINEE) {
+    if (leads && person.role === Role.Trainee) {
       const own = hands.filter((one) => session.sceneHands.has(one) && !session.isTracked(one));
       for (const id of own) {
         const [name, what] = [session.sceneHands.get(id)?.name ?? "", session.nameOfHand(id)];
@@ -189,7 +201,8 @@ export function people(session: Session, { leads, hand, whyNoTaking }: Lead): No
     }
     const limited = hands.map((id) => interventions(session.hands.get(id)?.safety_flags ?? 0)).find((text) => text !== "") ?? "";
     const guidance = guided.length === 0 ? "" : t("guide.acts", { what: guided.map((id) => session.nameOfHand(id)).join(", ") });
-    if (leads && person.role !== OBSERVER) act("kick", String(person.client_id), t("desk.kick"), `${t("desk.kick")}: ${person.name}`);
+    // the gateway of the console is an observer
+    if (leads && person.role !== Role.Observer && person.client_id !== self) act("kick", String(person.client_id), t("desk.kick"), `${t("desk.kick")}: ${person.name}`);
     head.title = link.text; // all of it, of a link that is not worth a line
     const details = [devices, link.isQuiet ? "" : link.text, guidance].filter((text) => text !== "").map((text) => h("small", "muted", text));
     if (limited !== "") details.push(h("small", "warn", limited));
@@ -222,7 +235,7 @@ export function events(session: Session, leads: boolean): Node[] {
 
 /** The emergency strip: always there. */
 export function strip(session: Session): { text: string; isRaised: boolean } {
-  const [raise] = session.standing;
+  const { raise } = session;
   return raise === undefined ? { text: t("stop.none"), isRaised: false } : { text: t("stop.raised", { who: retold(raise.who, ...SPEAKERS), reason: retold(raise.reason, "stop.reason") }), isRaised: true };
 }
 
@@ -241,7 +254,7 @@ export function status(session: Session, age: number): Node[] {
   items.push(item("status.contacts", String(touching)));
   const { recorder } = session;
   if (recorder !== undefined) {
-    const text = recorder.recording ? t("recorder.on", { count: String(recorder.messages) }) : recorder.problem || t("recorder.off");
+    const text = recorder.recording ? t("recorder.on", { count: String(recorder.messages) }) : problemOfRecorder(recorder.problem) || t("recorder.off");
     items.push(h("span", `stat ${recorder.problem === "" ? "" : "bad"}`, icon(recorder.recording ? "live" : "over"), text));
   }
   if (age > 0.5 && session.link?.state === "joined" && !session.isOver) items.push(h("span", "stat warn", icon("warn"), t("status.stale", { seconds: n(age, 1) })));

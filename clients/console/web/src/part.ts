@@ -1,22 +1,24 @@
 // Taking part: a place in the session for who sits at this page, and what stands around the hand while it is taken.
-import { reasonOfLoss } from "./desk";
+import { Dialog } from "./dialog";
 import { h, icon, marked, type Icon } from "./dom";
+import { reasonOfLoss } from "./eventtext";
+import { gamepad } from "./gamepad";
 import { Hand } from "./hand";
 import { hasHeadset, Headset, type CardText } from "./headset";
 import type { DeskAnswer, LiveSource } from "./live";
-import { NONE } from "./messages";
+import { NONE, Role, RunPhase } from "./messages";
 import { reasonOfEnd } from "./panels";
 import type { SceneView } from "./scene";
+import { askForSeat, SEATS, type SeatName } from "./seat";
 import type { Session } from "./session";
-import { localized, n, t, type Key } from "./strings";
+import { keep, kept, localized, n, retold, SPEAKERS, t, type Key } from "./strings";
 
 const MOST_HANDS = 2;
-const ROLES = { trainee: 2, instructor: 1 } as const; // as in the messages
-type RoleName = keyof typeof ROLES;
 const TAUGHT = "taught"; // in this browser's memory
 const LOUDEST = 10; // [N]
 const HOLD_PERIOD = 30; // [ms] in which a button that is held moves the hand
 const ICONS_ONLY: Key[] = ["part.sound", "part.help"];
+const MOVES: Key[] = ["part.nearer", "part.farther", "part.turn", "part.fine", "part.depth", "part.align"]; // nothing, while the hand is held still
 const GESTURES = ["drag", "wheel", "depth", "turn", "vertical", "align", "fine", "look", "view"] as const;
 
 export class Part {
@@ -25,7 +27,7 @@ export class Part {
   readonly bar = h("section", "handbar");
   readonly lesson = h("section", "lesson");
   hand?: Hand;
-  private dialog = h("dialog", "");
+  private dialog = new Dialog(() => this.raise());
   private state = h("div", "hand-state");
   private arm = h("button", "primary arm");
   private tools = h("div", "hand-tools");
@@ -37,6 +39,8 @@ export class Part {
   alarm: () => string = () => "";
   onLoss?: (reason: string, again: () => void) => void;
   onTaken?: () => void;
+  /** Whether the seat at this page may clear an emergency stop. */
+  canClear: () => boolean = () => false;
   isLocal = true; // nobody elsewhere reaches the gateway: a trainee needs no key
   private isAsking = false;
   private isEnded = new AbortController();
@@ -45,7 +49,7 @@ export class Part {
   private isNew = false; // of the step nothing was shown yet
 
   /** `tell` says what came of a request. */
-  constructor(private source: LiveSource, private session: Session, private view: SceneView, private pass: () => string, private tell: (isGood: boolean, text: string) => void, private raise: () => void) {
+  constructor(private source: LiveSource, private session: Session, private view: SceneView, private tell: (isGood: boolean, text: string) => void, private raise: () => void) {
     const lookForHeadset = (): void => void hasHeadset().then((has) => {
       this.hasHeadset = has;
       this.setWords();
@@ -81,7 +85,6 @@ export class Part {
     add("part.help", "help", () => this.teach(this.lesson.hidden));
     this.bar.append(this.state, this.arm, this.tools);
     this.bar.hidden = this.lesson.hidden = true;
-    document.body.append(this.dialog);
     this.setWords();
   }
 
@@ -94,11 +97,13 @@ export class Part {
       if (this.hand?.isOn !== true || button.offsetParent === null) return stop();
       this.hand.go(0, 0, (direction * HOLD_PERIOD * (this.hand.isFine ? 0.1 : 1)) / 1000);
     };
-    button.addEventListener("pointerdown", () => {
+    const begin = (): void => {
       stop();
       timer = window.setInterval(go, HOLD_PERIOD);
-    });
-    for (const name of ["pointerup", "pointerleave", "pointercancel"] as const) button.addEventListener(name, stop);
+    };
+    button.addEventListener("pointerdown", begin);
+    button.addEventListener("keydown", ({ key, repeat }) => key === "Enter" && !repeat && begin());
+    for (const name of ["pointerup", "pointerleave", "pointercancel", "keyup", "blur"] as const) button.addEventListener(name, stop);
     addEventListener("blur", stop, { signal: this.isEnded.signal });
   }
 
@@ -125,7 +130,7 @@ export class Part {
 
   private teach(shows: boolean): void {
     this.lesson.hidden = !shows;
-    if (!shows) localStorage.setItem(TAUGHT, "yes");
+    if (!shows) keep(TAUGHT, "yes");
   }
 
   /** Called when the session or the hand has changed. */
@@ -148,13 +153,15 @@ export class Part {
       this.isNew = false;
       if (![hand.guide.from, hand.guide.to].every((place) => this.view.isInSight(place))) this.look();
     }
-    const stopped = session.standing.length > 0;
+    const stopped = session.isRaised;
     this.arm.hidden = hand.isOn || stopped || hand.now === undefined;
     const texts = this.describe(hand, stopped);
     const node = h("div", "", ...texts);
     if (node.innerHTML !== this.state.innerHTML) this.state.replaceChildren(...node.childNodes);
     this.tools.hidden = !hand.isOn;
-    for (const { button, isPressed, shows } of this.buttons) {
+    const still = this.stillness();
+    for (const { button, key, isPressed, shows } of this.buttons) {
+      if (MOVES.includes(key) && (button.disabled = still !== undefined) !== (button.title !== t(key))) button.title = t(still ?? key);
       button.hidden = shows !== undefined && !shows();
       if (isPressed !== undefined) button.setAttribute("aria-pressed", String(isPressed()));
     }
@@ -164,8 +171,10 @@ export class Part {
     const { now, guide, session } = { now: hand.now, guide: hand.guide, session: this.session };
     if (now === undefined) return [h("span", "", t("part.wait"))];
     const name = session.titleOf(now.objectId) || session.nameOfHand(this.ids[hand.current]);
-    if (stopped) return [icon("stop"), h("b", "", name), h("span", "bad", t("part.stopped"))];
+    if (stopped) return [icon("stop"), h("b", "", name), h("span", "bad", ...marked(this.whatStopped()))];
     if (!hand.isOn) return [icon("hand"), h("b", "", name), h("span", "", t("part.off"))];
+    const still = this.stillness();
+    if (still !== undefined) return [icon("hand"), h("b", "", name), h("span", "", t(still))];
     const force = h("span", now.inContact ? "force touching" : "force", now.inContact ? t("part.force", { force: n(now.force, 1) }) : t("part.free"));
     const way: Node[] = [];
     if (session.isGuided(this.ids[hand.current])) way.push(h("span", "way", t("part.guided")));
@@ -177,6 +186,20 @@ export class Part {
       if (guide.angle !== undefined && guide.angle > 0.035) way.push(h("span", "angle", t("part.way.angle", { angle: n((guide.angle * 180) / Math.PI, 0) })));
     }
     return [icon("hand"), h("b", "", name), force, ...way];
+  }
+
+  /** Why the hand does not move though it is on. */
+  private stillness(): Key | undefined {
+    const { run } = this.session;
+    if (run?.phase === RunPhase.Paused) return "part.paused";
+    return run?.forces_frozen === true ? "part.frozen" : undefined;
+  }
+
+  /** Who ends a stop, and what is to be done then. */
+  private whatStopped(): string {
+    if (this.canClear()) return t("part.stopped");
+    const instructors = [...this.session.people.values()].filter(({ alive, role }) => alive && role <= Role.Instructor);
+    return instructors.length === 0 ? t("part.stopped.alone") : t("part.stopped.by", { who: instructors.map(({ name }) => retold(name, ...SPEAKERS)).join(", ") });
   }
 
   /** Enters the headset, or leaves it. */
@@ -204,7 +227,7 @@ export class Part {
   private cardText(): CardText {
     const { hand, session } = this;
     const { step } = session;
-    const isStopped = session.standing.length > 0;
+    const isStopped = session.isRaised;
     const state = hand === undefined ? "" : this.describe(hand, isStopped).map((node) => node.textContent ?? "").filter((text) => text !== "").join(" · ");
     return {
       head: step === undefined ? "" : t("step.count", { step: step.step + 1, steps: step.steps }),
@@ -223,53 +246,38 @@ export class Part {
   }
 
   /** The hands of a role. */
-  private handsOf(role: RoleName): { ids: number[]; names: string[] } {
-    const all = [...this.session.sceneHands.values()].filter((hand) => hand.role === ROLES[role] && !this.session.isTracked(hand.hand_id) && hand.object_id !== NONE);
+  private handsOf(role: SeatName): { ids: number[]; names: string[] } {
+    const all = [...this.session.sceneHands.values()].filter((hand) => hand.role === SEATS[role] && !this.session.isTracked(hand.hand_id) && hand.object_id !== NONE);
     const some = all.sort((a, b) => a.hand_id - b.hand_id).slice(0, MOST_HANDS);
     return { ids: some.map((hand) => hand.hand_id), names: some.map((hand) => hand.name) };
   }
 
   private ask(): void {
-    const role = h("select", "");
-    const roles = (Object.keys(ROLES) as RoleName[]).filter((name) => this.handsOf(name).ids.length > 0);
-    role.append(...roles.map((name) => Object.assign(h("option", "", t(`role.name.${name}`)), { value: name })));
-    if (roles.some((name) => name === this.invited)) role.value = this.invited;
+    const { invited } = this;
     this.invited = "";
-    const name = Object.assign(h("input", ""), { maxLength: 40, value: localStorage.getItem("name") ?? "", autocomplete: "off" });
-    const key = Object.assign(h("input", ""), { type: "password", autocomplete: "off" });
-    const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", ...marked(t(hint)))]));
-    const keyField = field("desk.sit.key", key, "desk.sit.hint");
-    const note = h("p", "muted place");
-    const update = (): void => {
-      const wanted = this.handsOf(role.value as RoleName).ids;
-      const others = [...this.session.people.values()].filter((person) => person.alive && Array.from(person.hands).some((hand) => wanted.includes(hand)));
-      note.textContent = others.length === 0 ? t("part.free.place") : t("part.taken.place", { who: others.map((person) => person.name).join(", ") });
-      keyField.hidden = (role.value === "trainee" && this.isLocal) || this.pass() !== "";
-    };
-    role.addEventListener("change", update);
-    update();
-    const cancel = Object.assign(h("button", "", t("desk.cancel")), { type: "button" });
-    cancel.addEventListener("click", () => this.dialog.close());
-    const stop = Object.assign(h("button", "stop", icon("stop"), t("stop.press")), { type: "button" });
-    stop.addEventListener("click", () => this.raise());
-    const form = h("form", "", h("h2", "", t("part.take")), h("p", "", t("part.what")), field("desk.sit.role", role), field("desk.sit.name", name), keyField, note,
-      h("div", "row end", stop, cancel, h("button", "primary", t("part.take"))));
-    form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      this.dialog.close();
-      localStorage.setItem("name", name.value);
-      void this.sit(role.value as RoleName, name.value, this.pass() || key.value.trim());
+    askForSeat(this.dialog, {
+      title: t("part.take"), what: t("part.what"), action: t("part.take"), wanted: invited,
+      roles: (["trainee", "instructor"] as const).filter((name) => this.handsOf(name).ids.length > 0),
+      needsKey: (role) => role !== "trainee" || !this.isLocal,
+      noteOf: (role) => {
+        const wanted = this.handsOf(role).ids;
+        const others = [...this.session.people.values()].filter((person) => person.alive && Array.from(person.hands).some((hand) => wanted.includes(hand)));
+        return others.length === 0 ? t("part.free.place") : t("part.taken.place", { who: others.map((person) => retold(person.name, ...SPEAKERS)).join(", ") });
+      },
+      done: async (...place) => {
+        void this.sit(...place);
+        return true;
+      },
     });
-    this.dialog.replaceChildren(form);
-    this.dialog.showModal();
   }
 
-  private async sit(role: RoleName, name: string, key: string): Promise<void> {
+  private async sit(role: SeatName, name: string, key: string): Promise<void> {
     const { ids, names } = this.handsOf(role);
     this.isAsking = true;
     this.show();
     // it hears of its hands before the answer comes
     this.ids = ids;
+    this.session.ownHands = new Set(ids);
     const hand = new Hand(this.session, this.view, ids, (bytes) => this.source.sendTargets(bytes));
     this.hand = hand;
     const answer = await this.source.ask("handTake", { role, name: name || t("desk.somebody"), key, hands: names });
@@ -280,7 +288,7 @@ export class Part {
       this.onTaken?.();
       hand.onContact = (force, index) => this.feel(force, index);
       this.step = -1;
-      this.teach(localStorage.getItem(TAUGHT) === null);
+      this.teach(kept(TAUGHT) === null);
       this.arm.focus();
     }
     this.show();
@@ -300,8 +308,16 @@ export class Part {
     this.headset?.end();
     this.hand?.end();
     this.hand = undefined;
+    this.session.ownHands = new Set();
     this.lesson.hidden = true;
     this.show();
+  }
+
+  /** With the connection. */
+  lose(): void {
+    const isLost = this.hand !== undefined && !this.isAsking;
+    this.end();
+    if (isLost && !this.session.isOver) this.onLoss?.(t("part.lost.link"), () => this.ask());
   }
 
   /** It is not shown any more. */
@@ -309,14 +325,17 @@ export class Part {
     this.end();
     this.isEnded.abort();
     void this.audio?.close();
-    for (const element of [this.take, this.bar, this.lesson, this.dialog]) element.remove();
+    this.dialog.remove();
+    for (const element of [this.take, this.bar, this.lesson]) element.remove();
   }
 
   /** True when it was one of the hand's keys. */
   onKeyDown(event: KeyboardEvent): boolean {
     if (this.hand === undefined) return false;
-    if (event.key === "Enter" && !this.hand.isOn && !(event.target instanceof HTMLButtonElement)) {
-      if (this.session.standing.length === 0) this.hand.press(); // after a stop was cleared it is for the person to switch it on
+    if (event.key === "Enter" && !this.hand.isOn) {
+      // what has the focus else is what Enter is for
+      if (event.target !== document.body && event.target !== this.view.canvas) return false;
+      if (!this.session.isRaised) this.hand.press(); // after a stop was cleared it is for the person to switch it on
     }
     else if (event.key === "m") this.toggleSound();
     else if (event.key === "c") this.look();
@@ -335,7 +354,7 @@ export class Part {
     const strength = Math.min(1, 0.3 + force / LOUDEST);
     this.headset?.feel(index, strength);
     if ("vibrate" in navigator) navigator.vibrate(Math.round(30 * strength));
-    void navigator.getGamepads().find((pad) => pad !== null)?.vibrationActuator?.playEffect("dual-rumble", { duration: 60, weakMagnitude: strength, strongMagnitude: strength });
+    void gamepad()?.vibrationActuator?.playEffect("dual-rumble", { duration: 60, weakMagnitude: strength, strongMagnitude: strength });
     if (this.audio === undefined) return;
     const { audio } = this;
     const tone = new OscillatorNode(audio, { type: "triangle", frequency: 320 });

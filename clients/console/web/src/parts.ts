@@ -5,8 +5,8 @@ import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.j
 
 import { asset } from "./assets";
 import { creases } from "./creases";
-import { place } from "./markers";
 import { Status, type RecordedModel, type SceneModels, type SceneObject } from "./messages";
+import { place } from "./pose";
 import { release } from "./release";
 import type { Session } from "./session";
 

@@ -1,14 +1,17 @@
 // The controls of a recording: play, step, speed, and a time line with steps, events and notes on which one seeks.
+import { Together } from "./beside";
 import { h, icon, zoomOf, type Icon } from "./dom";
-import { clock } from "./panels";
+import { kindOf, textOf } from "./eventtext";
 import type { Mark, Recording } from "./recording";
 import type { Session } from "./session";
-import { t } from "./strings";
+import { moment, t } from "./strings";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 const SETTLED = 60; // ms without another seek, after which that is read
+const BETWEEN = 20; // [ms] in which a picture begins
 const WINDOW = 30; // s of what is plotted before the place that was sought
 const FRAME = 1 / 30; // s of a single step
+const TELL = 250; // [ms] between two tellings of how much was played
 const SHAPES: [(mark: Mark) => boolean, string][] = [
   [(mark) => mark.kind === "note", "note"],
   [(mark) => mark.severity >= 2 || mark.kind.includes("emergency"), "bad"],
@@ -16,8 +19,19 @@ const SHAPES: [(mark: Mark) => boolean, string][] = [
   [(mark) => mark.kind === "mounted", "good"],
 ];
 
-/** What somebody does with a player, so that another one can do the same: `step`: and s since it began, where both have it. */
-export interface Command { isPlaying?: boolean; speed?: number; seconds?: number; step?: { name: string; after: number } }
+/**
+ * What somebody does with a player, so that another one can do the same: `step`: and s since it began, where both have it. `played`: s of the recording since then,
+ * by which the one that is ahead waits.
+ */
+export interface Command { isPlaying?: boolean; speed?: number; seconds?: number; step?: { name: string; after: number }; played?: number }
+
+/** What is at a place [s] with its time of the session [s]: the step, and the first mark within `near` [s]. */
+export function hintAt(session: Session, marks: Mark[], seconds: number, near: number, time = seconds): string {
+  const step = marks.filter((mark) => mark.kind === "step" && mark.seconds <= seconds).pop();
+  const mark = marks.find((other) => SHAPES.some(([fits]) => fits(other)) && Math.abs(other.seconds - seconds) <= near);
+  const texts = [moment(time), step === undefined ? "" : textOf(session, step), mark === undefined ? "" : `${kindOf(mark)}: ${textOf(session, mark)}`];
+  return texts.filter((text) => text !== "").join(" · ");
+}
 
 export class Player {
   /** Called with each of them. */
@@ -25,19 +39,24 @@ export class Player {
   /** Called with a recording that is to be shown beside this one. */
   onCompare?: (file: File) => void;
   readonly element = h("section", "player");
-  time = 0; // s since the beginning
+  time = 0; // s since the beginning of the recording
   isPlaying = false;
-  /** A place is sought. */
   /** Why the recording could not be read last; the next place may be. */
   problem?: string;
   /** The longest of the last seeks [ms]; for tests. */
   seekMilliseconds = 0;
   private speed = 1;
+  /** A seek is running. */
   isReading = false;
   private isBusy = false;
   private wanted?: number; // where to seek next
   private seeks = 0;
+  /** Seeks that are done. */
+  sought = 0;
   private last = 0;
+  private together = new Together();
+  private toldAt = 0;
+  private isEnded = false;
   private play = h("button", "play");
   private clockText = h("time", "clock");
   private speeds = h("select");
@@ -48,14 +67,14 @@ export class Player {
   private compare = h("button", "compare", icon("beside"));
   private file = Object.assign(h("input"), { type: "file", accept: ".mcap" });
 
-  constructor(readonly recording: Recording, private session: Session, private titleOf: (step: string) => string) {
+  constructor(readonly recording: Recording, private session: Session) {
     const back = this.button("back", () => this.seek(this.time - FRAME), "player.back");
     const on = this.button("on", () => this.seek(this.time + FRAME), "player.on");
     this.play.addEventListener("click", () => this.toggle());
     this.speeds.append(...SPEEDS.map((speed) => Object.assign(h("option", "", `${speed < 1 ? `1/${1 / speed}` : speed} ×`), { value: String(speed), selected: speed === 1 })));
     this.speeds.addEventListener("change", () => {
       this.speed = Number(this.speeds.value);
-      this.onCommand?.({ speed: this.speed });
+      this.command({ speed: this.speed });
     });
     this.file.addEventListener("change", () => {
       const file = this.file.files?.[0];
@@ -124,15 +143,9 @@ export class Player {
     return ((event.clientX - box.left) / Math.max(1, box.width)) * this.recording.seconds;
   }
 
-  /** What is there: the step, and the nearest mark within a few pixels. */
   private showHint(event: PointerEvent): void {
-    const seconds = this.secondsAt(event);
     const width = Math.max(1, this.line.clientWidth);
-    const near = (4 / width) * this.recording.seconds;
-    const step = this.recording.marks.filter((mark) => mark.kind === "step" && mark.seconds <= seconds).pop();
-    const mark = this.recording.marks.find((other) => SHAPES.some(([fits]) => fits(other)) && Math.abs(other.seconds - seconds) <= near);
-    const texts = [clock(seconds), step === undefined ? "" : this.titleOf(step.text), mark === undefined ? "" : `${mark.kind}: ${mark.text}`];
-    this.hint.textContent = texts.filter((text) => text !== "").join(" · ");
+    this.hint.textContent = hintAt(this.session, this.recording.marks, this.secondsAt(event), (4 / width) * this.recording.seconds, this.recording.sessionTimeOf(this.secondsAt(event)));
     this.hint.hidden = false;
     this.hint.style.left = `${Math.min(width - 120, Math.max(120, (event.clientX - this.line.getBoundingClientRect().left) / zoomOf(this.line)))}px`;
   }
@@ -148,7 +161,7 @@ export class Player {
     if (!this.isPlaying && this.time >= this.recording.seconds) this.seek(0);
     else if (this.problem !== undefined) this.seek(this.time); // what is to come is read anew
     this.isPlaying = !this.isPlaying;
-    this.onCommand?.({ isPlaying: this.isPlaying });
+    this.command({ isPlaying: this.isPlaying });
     this.show();
   }
 
@@ -158,8 +171,15 @@ export class Player {
     this.compare.hidden = false;
   }
 
+  private command(command: Command): void {
+    this.together.restart();
+    this.onCommand?.(command);
+  }
+
   /** Does what was done to another player: of a step the same time since its beginning, else the same time. */
-  obey({ isPlaying, speed, seconds, step }: Command): void {
+  obey({ isPlaying, speed, seconds, step, played }: Command): void {
+    if (played !== undefined) return this.together.hear(played, this.speed);
+    this.together.restart();
     if (isPlaying !== undefined) this.isPlaying = isPlaying;
     if (speed !== undefined) this.speeds.value = String((this.speed = speed));
     const mark = step === undefined ? undefined : this.recording.marks.find(({ kind, text }) => kind === "step" && text === step.name);
@@ -178,8 +198,16 @@ export class Player {
 
   seek(seconds: number): void {
     const mark = this.recording.marks.filter(({ kind, seconds: at }) => kind === "step" && at <= seconds).pop();
-    this.onCommand?.({ seconds, step: mark === undefined ? undefined : { name: mark.text, after: seconds - mark.seconds } });
+    this.command({ seconds, step: mark === undefined ? undefined : { name: mark.text, after: seconds - mark.seconds } });
     this.go(seconds);
+  }
+
+  /** It is not shown any more, and tells the session nothing more. */
+  end(): void {
+    this.isEnded = true;
+    this.wanted = undefined;
+    ++this.seeks;
+    this.element.remove();
   }
 
   /** The last place asked for counts. */
@@ -189,21 +217,27 @@ export class Player {
   }
 
   private async work(): Promise<void> {
-    if (this.isBusy) return;
-    this.isBusy = this.isReading = true;
+    if (this.isBusy || this.isEnded) return;
+    this.isBusy = true;
     while (this.wanted !== undefined) {
+      this.isReading = true;
       this.time = this.wanted;
       this.wanted = undefined;
       ++this.seeks;
+      this.show();
       const began = performance.now();
       this.session.reset();
       this.problem = undefined;
       await this.attempt(() => this.recording.seek(this.time));
       this.seekMilliseconds = performance.now() - began;
+      this.isReading = false;
+      ++this.sought;
+      // where the next place is wanted already, as in a drag, this one is drawn before that is read
+      if (this.wanted !== undefined) await new Promise((resolve) => setTimeout(resolve, BETWEEN));
     }
-    this.isBusy = this.isReading = false;
+    this.isBusy = false;
     this.show();
-    if (this.problem !== undefined) return;
+    if (this.problem !== undefined || this.isEnded) return;
     const { seeks } = this;
     const isStale = (): boolean => seeks !== this.seeks;
     await new Promise((resolve) => setTimeout(resolve, SETTLED));
@@ -228,11 +262,13 @@ export class Player {
   update(now: number): void {
     const elapsed = Math.min(0.1, (now - this.last) / 1000);
     this.last = now;
-    if (!this.isPlaying || this.isBusy) return;
+    if (!this.isPlaying || this.isBusy || this.isEnded) return;
+    const time = Math.min(this.recording.seconds, this.time + this.together.pass(elapsed * this.speed));
+    this.tellPlayed(now);
     this.isBusy = true;
-    const time = Math.min(this.recording.seconds, this.time + elapsed * this.speed);
     void this.attempt(async () => {
       await this.recording.advance(time);
+      if (this.wanted === undefined) this.together.played += time - this.time;
       this.time = time;
       if (time >= this.recording.seconds) this.isPlaying = false;
     }).then(() => {
@@ -242,8 +278,21 @@ export class Player {
     });
   }
 
+  private tellPlayed(now: number): void {
+    if (now - this.toldAt < TELL) return;
+    this.toldAt = now;
+    this.onCommand?.({ played: this.together.played });
+  }
+
+  /** [s] of the session, as its tables and plots count it: 0 at the first tick, less before it. */
+  get sessionTime(): number {
+    const counted = this.recording.sessionTimeOf(this.time);
+    // before the first tick its poses are shown already
+    return counted > 0 && this.session.tick > 0 && !this.isReading ? this.session.tick / 1000 : counted;
+  }
+
   private show(): void {
-    const text = `${clock(this.time)} / ${clock(this.recording.seconds)}`;
+    const text = `${moment(this.sessionTime)} / ${moment(this.recording.sessionTimeOf(this.recording.seconds))}`;
     if (this.clockText.textContent !== text) this.clockText.textContent = text;
     const state = this.isPlaying ? "pause" : "now";
     if (this.play.dataset["state"] !== state) {

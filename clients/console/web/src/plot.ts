@@ -8,6 +8,7 @@ import type { Session } from "./session";
 import { keep, kept, n, t, type Key } from "./strings";
 
 const WINDOW = 30; // s
+const CURSOR_STEP = 4; // [pixels] by a key
 const PERIOD = 150; // [ms] between pictures
 const SERIES = 4;
 const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3]];
@@ -97,6 +98,18 @@ class Plot {
     });
   }
 
+  /** Where the cursor is [pixels]; the right border, where there is none. Undefined: nothing is plotted. */
+  get cursor(): number | undefined {
+    const { plot } = this;
+    if (plot === undefined) return undefined;
+    const left = plot.cursor.left ?? -1;
+    return left < 0 ? plot.over.clientWidth - 1 : left;
+  }
+  set cursor(left: number) {
+    const { plot } = this;
+    plot?.setCursor({ left: Math.min(plot.over.clientWidth - 1, Math.max(0, left)), top: plot.over.clientHeight / 2 });
+  }
+
   /** Of the safety layer, as bits; of other tracks than forces none. */
   private rulesAt(track: string, seconds: number): number {
     const rules = this.session?.tracks.all.get(track.replace("force", "safety"));
@@ -173,6 +186,13 @@ export class Plots {
       this.choice.append(chip);
     }
     this.lay();
+  }
+
+  /** The cursor of all plots goes to the left or right: what it is at is read below each of them. */
+  moveCursor(direction: number): void {
+    const plots = [...this.plots.values()];
+    const left = plots.map(({ cursor }) => cursor).find((place) => place !== undefined);
+    if (left !== undefined) for (const plot of plots) plot.cursor = left + CURSOR_STEP * direction; // all have the same scale of time
   }
 
   private toggle(name: string): void {

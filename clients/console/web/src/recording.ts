@@ -4,24 +4,26 @@ import { McapIndexedReader } from "@mcap/core";
 import { decompress } from "fzstd";
 
 import { decoderOf, type Decoder } from "./decode";
+import { History, type Message } from "./history";
 import { INSTANCE_STATE, type Handler } from "./live";
 import type { ConsoleState, ContactPairs, EventLog, HandState, InstanceGone, SceneUpdate, SessionAnnounce, Telemetry, TickStats } from "./messages";
 import { t, type Key } from "./strings";
 import { Tracks } from "./tracks";
 
-// states and events: all of them before a moment tell how it stands then
+// states, events and what is seldom told: read once, and then known for every moment
 const KEPT = [
-  "SessionAnnounce", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "StepState", "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "ClientEvent",
-  INSTANCE_STATE,
+  "SessionAnnounce", "SceneObject", "SceneHand", "SceneStep", "SceneTitle", "ObjectSnapshot", "StepState", "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "ClientEvent",
+  "Telemetry", INSTANCE_STATE,
 ];
-// streams: the newest of each instance before a moment
-const STREAMS = ["WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress", "Telemetry"];
+// streams: the newest of each instance is read before a moment
+const STREAMS = ["WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress"];
 const ALL_OBJECTS = "WorldFrame_30"; // has those that rest, too; a seek alone reads it
 const BEFORE = [150_000_000n, 1_000_000_000n, 8_000_000_000n]; // [ns] in which a frame of all objects is looked for: in real time some are lost
 const PLOTTED = ["HandState_100", "ContactPairs_100", "TickStats_100", "Telemetry"]; // each sample has the maxima since the one before
-const TOLD = ["device", "safety"]; // of a station's events; it writes many others
+const ENDING = "Presence"; // of whose instances the end counts
+const INPUTS = "TickInput"; // of a journal
 const YIELD = 500; // messages that are read at a time, of many
-const CHUNKS = 6; // decompressed ones that are kept: seeking and playing read the same again
+const CHUNKS = 24; // decompressed ones that are kept, of about 1 MB: seeking and playing read the same again
 const BLOCK = 1 << 19; // bytes that are read at a time
 const BLOCKS = 48; // that are kept
 const LARGEST = 1 << 26; // bytes of a chunk
@@ -33,6 +35,8 @@ export class Unreadable extends Error {
     super(t(key, values));
   }
 }
+
+const MAGIC = [0x89, 0x4d, 0x43, 0x41, 0x50, 0x30, 0x0d, 0x0a]; // with which an MCAP file begins and ends
 
 interface Readable { size(): Promise<bigint>; read(offset: bigint, size: bigint): Promise<Uint8Array> }
 
@@ -103,16 +107,29 @@ export async function fromAddress(address: string): Promise<Readable> {
   return new Blocks(size, async (begin, end) => new Uint8Array(await (await load(begin, end)).arrayBuffer()));
 }
 
+/**
+ * For a chunk. fzstd compares it with a number, for which JavaScript writes all of its bytes as a text first: without this method that takes ten times as long as
+ * decompressing.
+ */
+function bufferOf(size: number): Uint8Array {
+  return Object.defineProperty(new Uint8Array(size), Symbol.toPrimitive, { value: () => NaN });
+}
+
 /** Decompresses chunks and keeps the last ones. */
 class Chunks {
   private kept = new Map<string, Uint8Array>();
 
   readonly zstd = (bytes: Uint8Array, size: bigint): Uint8Array => {
     if (size > BigInt(LARGEST)) throw new Unreadable("file.index");
-    let hash = 0x811c9dc5; // FNV-1a; the reader checks the sum of what it gets
-    for (const byte of bytes) hash = Math.imul(hash ^ byte, 0x01000193);
+    // as FNV-1a, of words; the reader checks the sum of what it gets
+    const words = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    let hash = 0x811c9dc5;
+    for (let i = 0; i + 4 <= bytes.length; i += 4) {
+      hash = Math.imul(hash ^ words.getUint32(i, true), 0x01000193);
+      hash ^= hash >>> 15;
+    }
     const name = `${bytes.length} ${size} ${hash}`;
-    const chunk = this.kept.get(name) ?? decompress(bytes, new Uint8Array(Number(size)));
+    const chunk = this.kept.get(name) ?? decompress(bytes, bufferOf(Number(size)));
     this.kept.delete(name); // the newest at the end
     this.kept.set(name, chunk);
     if (this.kept.size > CHUNKS) this.kept.delete(this.kept.keys().next().value as string);
@@ -122,20 +139,9 @@ class Chunks {
 
 const FIRST_POSES = 40_000_000n; // [ns] in which the parts of a frame come
 
-interface Message { time: bigint; channel: number; data: Uint8Array; message?: unknown }
+interface Sample extends Message { data: Uint8Array }
 type Reading = AsyncGenerator<{ logTime: bigint; channelId: number; data: Uint8Array }, void, void>;
 export interface Mark { seconds: number; tick: number; kind: string; text: string; severity: number }
-
-/** The last message up to a time, of messages in order. */
-function lastUntil(messages: Message[], time: bigint): Message | undefined {
-  let [first, end] = [0, messages.length];
-  while (first < end) {
-    const middle = (first + end) >> 1;
-    if (messages[middle].time <= time) first = middle + 1;
-    else end = middle;
-  }
-  return messages[first - 1];
-}
 
 let opened = 0; // recordings, by this page
 
@@ -155,6 +161,25 @@ async function beginOf(reader: McapIndexedReader, first: bigint): Promise<bigint
   return streamed < announced || (await isInLockstep(reader)) ? streamed : announced;
 }
 
+/** Why a file with messages is no recording that can be played, as refusalOfKind() of idl/record/recording_kind.cpp has it. */
+function refuseKind(reader: McapIndexedReader): void {
+  const topics = [...reader.channelsById.values()].map(({ topic }) => topic);
+  if (!topics.includes("SessionAnnounce")) throw new Unreadable(topics.includes(INPUTS) ? "file.journal" : "file.foreign");
+}
+
+/** Why a file is no MCAP file that is complete, by its first and last bytes: no index is looked for in another one. */
+async function refuseOther(readable: Readable): Promise<void> {
+  const size = await readable.size();
+  if (size === 0n) throw new Unreadable("file.empty");
+  const long = BigInt(MAGIC.length);
+  const isMagic = async (offset: bigint): Promise<boolean> => {
+    const bytes = await readable.read(offset, long);
+    return MAGIC.every((byte, i) => bytes[i] === byte);
+  };
+  if (size < long || !(await isMagic(0n))) throw new Unreadable("file.foreign");
+  if (size < 2n * long || !(await isMagic(size - long))) throw new Unreadable("file.no_index");
+}
+
 async function isInLockstep(reader: McapIndexedReader): Promise<boolean> {
   for await (const { metadata } of reader.readMetadata({ name: "tenon recording" })) return metadata.get("lockstep") === "yes";
   return false;
@@ -163,30 +188,35 @@ async function isInLockstep(reader: McapIndexedReader): Promise<boolean> {
 export class Recording {
   /** What happened, by the server's log, in s since the beginning of the recording. */
   marks: Mark[] = [];
-  private kept: Message[] = [];
-  private snapshots = new Map<string, Message[]>(); // of each object, in order
+  private history = new History();
   private decoders = new Map<number, { topic: string; decode: Decoder }>();
   private reading?: Reading;
-  private next?: Message;
+  private next?: Sample;
   private streams = STREAMS;
   private life = -1 - ++opened; // no live session's: the scene of another recording is another one
+
+  /** The first tick that is recorded as a stream. */
+  private first?: { seconds: number; tick: number };
 
   private constructor(private reader: McapIndexedReader, private handler: Handler, readonly begin: bigint, readonly seconds: number) {}
 
   /** Fails with the reason when it is no recording, or was cut before its index. */
   static async open(readable: Readable, handler: Handler, onProgress: (fraction: number) => void): Promise<Recording> {
+    await refuseOther(readable);
     const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers: { zstd: new Chunks().zstd } }).catch((problem: unknown) => {
       console.warn(problem); // what the library found instead, in its words
       throw problem instanceof Unreadable || problem instanceof DOMException ? problem : new Unreadable("file.no_index");
     });
     const { statistics } = reader;
     if (statistics === undefined || statistics.messageCount === 0n) throw new Unreadable("file.empty");
+    refuseKind(reader);
     const begin = await beginOf(reader, statistics.messageStartTime);
     const recording = new Recording(reader, handler, begin, Number(statistics.messageEndTime - begin) / 1e9);
     for (const channel of reader.channelsById.values()) recording.addChannel(channel.id);
     // a recording inside a report has no faster poses
     if (![...recording.decoders.values()].some(({ topic }) => topic === "WorldFrame_100")) recording.streams = [...STREAMS, ALL_OBJECTS];
     await recording.readKept(onProgress);
+    await recording.readFirst();
     return recording;
   }
 
@@ -209,40 +239,67 @@ export class Recording {
     for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: KEPT })) {
       if (++read % 50 === 0) onProgress(Math.max(0, Number(logTime - this.begin)) / 1e9 / Math.max(this.seconds, 1e-9));
       const channel = this.decoders.get(channelId);
-      if (channel?.topic === "ObjectSnapshot") {
-        const name = this.instanceOf(channelId, data);
-        const earlier = this.snapshots.get(name);
-        const snapshot = { time: logTime, channel: channelId, data: data.slice() };
-        if (earlier === undefined) this.snapshots.set(name, [snapshot]);
-        else earlier.push(snapshot);
-        continue;
-      }
-      const message = channel?.decode(data);
-      if (channel?.topic === "ClientEvent" && !TOLD.includes((message as EventLog).kind)) continue;
-      this.kept.push({ time: logTime, channel: channelId, data: data.slice(), message });
-      if (channel?.topic !== "EventLog") continue;
-      const { kind, text, severity, tick } = message as EventLog;
-      this.marks.push({ seconds: Number(logTime - this.begin) / 1e9, tick: Number(tick), kind, text, severity });
+      if (channel === undefined) continue;
+      const own = data.slice(); // the whole chunk is not kept
+      if (channel.topic === "ObjectSnapshot") this.history.add(channel.topic, { time: logTime, channel: channelId, data: own }, this.instanceOf(channelId, own)); // few of them are told
+      else this.keep(logTime, channelId, channel.topic, channel.decode(own));
     }
+  }
+
+  private keep(time: bigint, channel: number, topic: string, message: unknown): void {
+    if (topic === INSTANCE_STATE) return this.keepEnd(time, message as InstanceGone);
+    this.history.add(topic, { time, channel, message });
+    if (topic === "EventLog") this.mark(time, message as EventLog);
+  }
+
+  private keepEnd(time: bigint, { topic, key_sample }: InstanceGone): void {
+    const ended = topic === ENDING ? [...this.decoders].find(([, other]) => other.topic === topic) : undefined;
+    if (ended !== undefined) this.history.add(topic, { time, channel: ended[0], message: ended[1].decode(Uint8Array.from(key_sample)), isGone: true });
+  }
+
+  private mark(time: bigint, { kind, text, severity, tick }: EventLog): void {
+    this.marks.push({ seconds: Number(time - this.begin) / 1e9, tick: Number(tick), kind, text, severity });
   }
 
   /** When a tick was, in s since the beginning: counted from the last mark before it, since ticks are no clock in lockstep, at a pause, and while no server ran. */
   secondsOf(tick: number): number {
-    let from = this.marks[0] ?? { seconds: 0, tick: 0 };
-    for (const mark of this.marks) if (mark.tick <= tick && mark.tick >= from.tick) from = mark;
+    if (tick < 0 && this.first !== undefined) return this.first.seconds + (tick - this.first.tick) / 1000;
+    let before: Mark | undefined;
+    for (const mark of this.marks) if (mark.tick <= tick && mark.tick >= (before?.tick ?? 0)) before = mark;
+    const from = before ?? this.marks[0] ?? { seconds: 0, tick: 0 };
     return from.seconds + (tick - from.tick) / 1000;
+  }
+
+  private async readFirst(): Promise<void> {
+    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: ["TickStats_100", "WorldFrame_100", ALL_OBJECTS] })) {
+      const { tick } = this.decoders.get(channelId)?.decode(data) as TickStats;
+      this.first = { seconds: Number(logTime - this.begin) / 1e9, tick: Number(tick) };
+      return;
+    }
+  }
+
+  /**
+   * The session's own time [s], 0 at its first tick and less before it, at a place of the recording: counted from the last event or the first tick before it, and never beyond the
+   * next event.
+   */
+  sessionTimeOf(seconds: number): number {
+    const first = this.first ?? this.marks.find(({ tick }) => tick > 0) ?? { seconds: 0, tick: 0 };
+    const from = this.marks.filter((mark) => mark.seconds >= first.seconds && mark.seconds <= seconds && mark.tick > 0).pop() ?? first;
+    const time = from.tick / 1000 + seconds - from.seconds;
+    const next = this.marks.find((mark) => mark.seconds > seconds && mark.seconds > from.seconds && mark.tick >= from.tick);
+    return next === undefined ? time : Math.min(time, next.tick / 1000);
   }
 
   private timeOf(seconds: number): bigint {
     return this.begin + BigInt(Math.round(1e9 * Math.min(this.seconds, Math.max(0, seconds))));
   }
 
-  private tell({ channel, data, message: decoded }: Message): void {
+  private tell({ channel, data, message: decoded, isGone = false }: Message): void {
     const known = this.decoders.get(channel);
     if (known === undefined) return;
-    const message = decoded ?? known.decode(data);
+    const message = decoded ?? known.decode(data ?? new Uint8Array());
     if (known.topic === "SessionAnnounce") return this.tellLink(message as SessionAnnounce);
-    if (known.topic !== INSTANCE_STATE) return this.handler(known.topic === ALL_OBJECTS ? "WorldFrame_100" : known.topic, message, false);
+    if (known.topic !== INSTANCE_STATE) return this.handler(known.topic === ALL_OBJECTS ? "WorldFrame_100" : known.topic, message, isGone);
     const { topic, key_sample } = message as InstanceGone;
     const ended = [...this.decoders.values()].find((other) => other.topic === topic);
     if (ended !== undefined) this.handler(topic, ended.decode(Uint8Array.from(key_sample)), true);
@@ -267,17 +324,12 @@ export class Recording {
     throw new Error(`${topic} is not in the recording, or a box`);
   }
 
-  /** Tells how it stood at a time. What was told before is to be forgotten, and the announcement comes first. */
+  /** Emits the state at a time: kept messages, snapshots, newest stream samples. What was told before is to be forgotten. */
   async seek(seconds: number): Promise<void> {
     const time = this.timeOf(seconds);
     this.reading = undefined;
     this.next = undefined;
-    for (const message of this.kept)
-      if (message.time <= time || this.isScene(message)) this.tell(message);
-    for (const snapshots of this.snapshots.values()) {
-      const newest = lastUntil(snapshots, time);
-      if (newest !== undefined) this.tell(newest);
-    }
+    for (const message of this.history.until(time)) this.tell(message);
     let hasAll = false;
     for (const window of BEFORE) {
       const newest = await this.newestOf(time - window, time);
@@ -287,6 +339,7 @@ export class Recording {
       break;
     }
     if (!hasAll) await this.tellFirstPoses(time);
+    for (const message of this.history.linksUntil(time)) this.tell(message); // its samples are plotted at the session's time
     this.reading = this.reader.readMessages({ topics: [...KEPT, ...this.streams], startTime: time + 1n }) as unknown as Reading;
   }
 
@@ -306,11 +359,6 @@ export class Recording {
     for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: [...STREAMS, ALL_OBJECTS], startTime, endTime }))
       newest.set(this.instanceOf(channelId, data), { time: logTime, channel: channelId, data: data.slice() });
     return [...newest.values()].sort((a, b) => Number(a.time - b.time));
-  }
-
-  /** What never changes is known from the first moment. */
-  private isScene({ channel }: Message): boolean {
-    return ["SessionAnnounce", "SceneObject", "SceneHand", "SceneStep"].includes(this.decoders.get(channel)?.topic ?? "");
   }
 
   /** Of a stream: the channel and the key, which is the first number after the encapsulation's four bytes. */
@@ -347,7 +395,7 @@ export class Recording {
     const time = this.timeOf(seconds);
     const reading = this.reading;
     if (reading === undefined) return;
-    const newest = new Map<string, Message>();
+    const newest = new Map<string, Sample>();
     while (true) {
       if (this.next === undefined) {
         const { value } = await reading.next();

@@ -2,10 +2,13 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
+import { zoomOf } from "./dom";
 import { cornersOf, framing } from "./framing";
+import { Ghost } from "./ghost";
 import { Ground } from "./ground";
-import { COLORS, Markers, place } from "./markers";
-import { NONE, StepPhase } from "./messages";
+import { HeadsetView } from "./headsetview";
+import { Markers } from "./markers";
+import { NONE } from "./messages";
 import { isTooEarly, openDrawing, Pace, type Quality } from "./pace";
 import { Parts, type Pick } from "./parts";
 import type { Session } from "./session";
@@ -27,12 +30,10 @@ export class SceneView {
   private renderer: THREE.WebGLRenderer;
   private scene = new THREE.Scene();
   private camera = new THREE.PerspectiveCamera(42, 1, 0.02, 60);
-  /** Of the viewer in the world: as the world but in a headset, whose y is up. */
-  readonly rig = new THREE.Group();
-  private before?: THREE.PerspectiveCamera;
+  readonly headset: HeadsetView;
   private controls: OrbitControls;
   private ground: Ground;
-  private ghost?: { object: number; group: THREE.Group; material: THREE.MeshBasicMaterial };
+  private ghost = new Ghost(this.scene);
   private markers = new Markers(this.scene);
   private pace: Pace;
   private resizes = new ResizeObserver(() => this.resize());
@@ -50,6 +51,7 @@ export class SceneView {
   private isTurned = false; // by the viewer, or to the work: not to be framed anew by itself
   isHandMode = false;
   private covered = { left: 0, top: 0 }; // of the picture [pixels]
+  private size?: { width: number; height: number; ratio: number }; // of the next picture, where it is another one: [pixels of the page], pixels of the picture in one
 
   constructor(private host: HTMLElement, label: string, drawing: string | null) {
     const { context } = openDrawing(drawing);
@@ -72,8 +74,7 @@ export class SceneView {
     this.controls.addEventListener("change", () => (this.dirty = true));
     this.controls.addEventListener("start", () => (this.isTurned = true));
 
-    this.rig.add(this.camera);
-    this.scene.add(this.rig);
+    this.headset = new HeadsetView(this.renderer, this.scene, this.camera, () => this.parts.box(), { onPicture: () => void ++this.pictures, onEnd: () => this.resize() });
     this.renderer.localClippingEnabled = true;
     this.ground = new Ground(this.scene, this.renderer, this.simple);
     this.parts = new Parts(this.scene, this.simple, () => {
@@ -114,7 +115,7 @@ export class SceneView {
   /** Size of a pixel of the page at the depth of a place [m]. */
   metresPerPixel(place: THREE.Vector3): number {
     const depth = place.clone().sub(this.camera.position).dot(this.axes().away);
-    return (2 * Math.max(0.05, depth) * Math.tan((this.camera.fov * Math.PI) / 360)) / Math.max(1, this.host.clientHeight);
+    return (2 * Math.max(0.05, depth) * Math.tan((this.camera.fov * Math.PI) / 360)) / Math.max(1, this.host.clientHeight * zoomOf(this.host));
   }
 
   /** Where a place is drawn, in pixels of the page. */
@@ -176,15 +177,30 @@ export class SceneView {
 
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.host;
-    if (width === 0 || height === 0 || this.before !== undefined) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, this.pace.quality.ratio));
-    this.renderer.setSize(width, height, false);
+    if (width === 0 || height === 0 || this.headset.isOn) return;
+    const zoom = zoomOf(this.host);
+    this.size = { width, height, ratio: Math.min(devicePixelRatio, this.pace.quality.ratio) * zoom };
+    if (this.pictures === 0) this.fit(); // later with the next picture: until then the last one is stretched
+    this.controls.rotateSpeed = this.controls.panSpeed = 1 / zoom; // they measure ways in pixels of the page, and the picture in its own
     this.camera.aspect = width / height;
     const { left, top } = this.covered;
     if (left > 0 || top > 0) this.camera.setViewOffset(width, height, -left / 2, -top / 2, width, height);
     else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
     this.dirty = true;
+  }
+
+  /** A new size clears the canvas. */
+  private fit(): void {
+    if (this.size === undefined) return;
+    this.renderer.setPixelRatio(this.size.ratio);
+    this.renderer.setSize(this.size.width, this.size.height, false);
+    this.size = undefined;
+  }
+
+  private draw(): void {
+    this.fit();
+    this.renderer.render(this.scene, this.camera);
   }
 
   private setQuality({ hasShadows }: Quality): void {
@@ -228,7 +244,7 @@ export class SceneView {
     if (session.moved !== this.moved) {
       this.moved = session.moved;
       this.parts.takePoses(session);
-      this.takeGhost(session);
+      this.ghost.take(session, this.parts);
       this.markers.take(session);
       this.dirty = true;
       this.hasBegun = session.states.size > 0;
@@ -238,13 +254,13 @@ export class SceneView {
       if (this.parts.all.size > 0 && (isAnew || isWhole || (!this.isFramed && (this.hasBegun || session.isWaiting)))) this.frame();
       this.isFramedWaiting = !this.hasBegun && session.isWaiting;
     }
-    if (this.before !== undefined) return; // the headset asks for its pictures
+    if (this.headset.isOn) return; // the headset asks for its pictures
     this.controls.update();
     if (!this.pace.isReady(now) || !this.dirty || this.isTooEarly(now)) return;
     this.dirty = false;
     this.hasObjects = this.parts.all.size > 0;
     this.isWhole = this.parts.isComplete && this.isFramed;
-    this.renderer.render(this.scene, this.camera);
+    this.draw();
     this.pace.hasDrawn(now);
     ++this.pictures;
     this.onPicture?.();
@@ -295,6 +311,22 @@ export class SceneView {
     this.dirty = true;
   }
 
+  /** Nearer to what it looks at, or farther away, by a factor. */
+  zoom(factor: number): void {
+    this.goAround((off) => off.multiplyScalar(factor).clampLength(this.controls.minDistance, this.controls.maxDistance));
+  }
+
+  /** The viewer goes to the right about what it looks at [rad]. */
+  turn(angle: number): void {
+    this.goAround((off) => off.applyAxisAngle(this.camera.up, angle));
+  }
+
+  private goAround(change: (off: THREE.Vector3) => void): void {
+    const off = this.camera.position.clone().sub(this.controls.target);
+    change(off);
+    this.lookFrom(off.add(this.controls.target), this.controls.target);
+  }
+
   /** Looks from a place at another one. */
   lookFrom(eye: THREE.Vector3, at: THREE.Vector3): void {
     this.isTurned = true;
@@ -313,69 +345,9 @@ export class SceneView {
     this.dirty = true;
   }
 
-  /** The scene is shown in a headset at its size, from the trainee's side; `follow` is called before each picture. Fails when it cannot draw there. */
-  async enterHeadset(session: XRSession, follow: (frame: XRFrame, space: XRReferenceSpace) => void): Promise<void> {
-    const { xr } = this.renderer;
-    xr.enabled = true;
-    this.before = this.camera.clone();
-    try {
-      await xr.setSession(session);
-    } catch (problem) {
-      this.leaveHeadset();
-      throw problem;
-    }
-    let isPlaced = false;
-    this.renderer.setAnimationLoop((_, frame?: XRFrame) => {
-      const space = xr.getReferenceSpace();
-      if (frame === undefined || space === null) return;
-      const head = frame.getViewerPose(space);
-      if (!isPlaced && head !== undefined) this.placeRig(head.transform);
-      isPlaced ||= head !== undefined;
-      follow(frame, space);
-      this.renderer.render(this.scene, this.camera);
-      ++this.pictures;
-    });
-  }
-
-  leaveHeadset(): void {
-    const { xr } = this.renderer;
-    this.renderer.setAnimationLoop(null);
-    xr.enabled = false;
-    this.rig.position.set(0, 0, 0);
-    this.rig.quaternion.identity();
-    this.rig.updateMatrixWorld(true);
-    if (this.before !== undefined) this.camera.copy(this.before, false);
-    this.before = undefined;
-    this.resize();
-  }
-
-  /** The viewer's head, wherever it is in the room, comes before the scene and looks at it. */
-  private placeRig({ position, orientation }: XRRigidTransform): void {
-    const scene = this.parts.box().getBoundingSphere(new THREE.Sphere());
-    const eye = scene.center.clone().add(new THREE.Vector3(0, -Math.min(1.5, 0.5 + 0.4 * scene.radius), 0.45));
-    const ahead = new THREE.Vector3(0, 0, -1).applyQuaternion(orientation as unknown as THREE.Quaternion);
-    const turn = new THREE.Quaternion().setFromAxisAngle(new THREE.Vector3(0, 1, 0), Math.atan2(ahead.x, -ahead.z));
-    // y of the room is z of the world, and ahead is along y of the world
-    this.rig.quaternion.setFromAxisAngle(new THREE.Vector3(1, 0, 0), Math.PI / 2).multiply(turn);
-    this.rig.position.copy(eye).sub(new THREE.Vector3(position.x, position.y, position.z).applyQuaternion(this.rig.quaternion));
-    this.rig.updateMatrixWorld(true);
-  }
-
-  /** Where something of the headset is in the world; none while it is lost. */
-  poseIn(frame: XRFrame, of: XRSpace): { p: THREE.Vector3; q: THREE.Quaternion } | undefined {
-    const space = this.renderer.xr.getReferenceSpace();
-    const pose = space === null ? undefined : frame.getPose(of, space);
-    if (pose === undefined) return undefined;
-    const { position, orientation } = pose.transform;
-    return {
-      p: new THREE.Vector3(position.x, position.y, position.z).applyQuaternion(this.rig.quaternion).add(this.rig.position),
-      q: this.rig.quaternion.clone().multiply(new THREE.Quaternion(orientation.x, orientation.y, orientation.z, orientation.w)),
-    };
-  }
-
   /** Draws now, and puts the picture into another canvas, which paper takes. */
   copyTo(target: HTMLCanvasElement): void {
-    this.renderer.render(this.scene, this.camera);
+    this.draw();
     Object.assign(target, { width: this.canvas.width, height: this.canvas.height });
     target.getContext("2d")?.drawImage(this.canvas, 0, 0);
   }
@@ -384,42 +356,10 @@ export class SceneView {
     this.life = life;
     this.parts.clear();
     this.markers.clear();
-    this.removeGhost();
+    this.ghost.clear();
     this.isFramed = this.hasBegun = this.isFramedWaiting = this.isTurned = false;
     this.awaited = undefined;
     this.dirty = true;
-  }
-
-  private removeGhost(): void {
-    if (this.ghost === undefined) return;
-    this.scene.remove(this.ghost.group);
-    this.ghost.material.dispose(); // its geometry is the part's
-    this.ghost = undefined;
-  }
-
-  private takeGhost(session: Session): void {
-    const step = session.step;
-    const part = step === undefined ? undefined : this.parts.all.get(step.object_id);
-    const shows = step !== undefined && part?.model !== undefined && step.has_target && step.phase <= StepPhase.Active;
-    if (this.ghost !== undefined && (!shows || this.ghost.object !== step.object_id || this.ghost.group.userData["model"] !== part.model)) this.removeGhost();
-    if (!shows || part?.model === undefined) return;
-    if (this.ghost === undefined) {
-      const material = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.32, depthWrite: false, side: THREE.DoubleSide });
-      const group = new THREE.Group();
-      const model = part.model.clone(true);
-      model.traverse((child) => {
-        if (!(child instanceof THREE.Mesh)) return;
-        child.material = material;
-        child.castShadow = child.receiveShadow = false;
-      });
-      group.add(model);
-      group.userData["model"] = part.model;
-      group.renderOrder = 1;
-      this.scene.add(group);
-      this.ghost = { object: step.object_id, group, material };
-    }
-    place(this.ghost.group, step.X_WG);
-    this.ghost.material.color.setHex(session.isWithinTolerance ? COLORS.within : COLORS.target);
   }
 
   /** Where an object's frame is drawn [m]; for tests. */

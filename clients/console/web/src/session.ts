@@ -2,22 +2,26 @@
 import {
   NONE, RunPhase, StepPhase, type ConsoleState, type ContactPairs, type EmergencyStop, type EventLog, type GrabState, type HandState,
   type NewestRaise, type ObjectSnapshot, type ObjectState, type PairContact, type Presence, type RecorderStatus, type RunState, type SceneHand, type SceneObject,
-  type SceneStep, type StepProgress, type StepState, type Telemetry, type TickStats, type WorldFrame,
+  type SceneSignal, type SceneStep, type SceneTitle, type StepProgress, type StepState, type Telemetry, type TickStats, type WorldFrame,
 } from "./messages";
 import { deviceOf, type Device } from "./eventtext";
-import { localized } from "./strings";
+import { localized, t, type Key } from "./strings";
 import { Tracks } from "./tracks";
 
 export const TOPICS = [
-  "/console", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepState", "StepProgress",
+  "/console", "SceneObject", "SceneHand", "SceneStep", "SceneTitle", "SceneSignal", "ObjectSnapshot", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepState", "StepProgress",
   "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "NewestRaise", "EventLog", "ClientEvent", "Telemetry", "RecorderStatus", "__instance_state",
 ] as const;
 
-const EVENTS = 200;
+/** That are kept, of the server and of all stations. */
+export const EVENTS = 200;
 
 /** Times in s of the session; `seconds` [s]: the step's own time, without pauses and emergency stops. */
 interface Visit { started: number; ended?: number; seconds?: number; phase?: StepPhase }
 export interface StepEntry extends SceneStep, Partial<Visit> { isNow: boolean }
+/** From a tick on: whether steps have their time. */
+interface Run { tick: bigint; goes: boolean }
+const GOES = ["running", "forces frozen"]; // events of the run
 const STEP_ENDS: Record<string, StepPhase> = { "step done": StepPhase.Done, "step skipped": StepPhase.Skipped, "step timed out": StepPhase.TimedOut };
 
 /** Keeps the newest message of each key. */
@@ -31,6 +35,8 @@ export class Session {
   states = new Map<number, ObjectState>();
   sceneHands = new Map<number, SceneHand>();
   sceneSteps = new Map<number, SceneStep>();
+  sceneSignals = new Map<number, SceneSignal>();
+  sceneTitle?: SceneTitle;
   hands = new Map<number, HandState>();
   grabs = new Map<number, GrabState>();
   people = new Map<number, Presence>();
@@ -49,17 +55,22 @@ export class Session {
   /** Increased when poses, and when anything else has changed. */
   moved = 0;
   changed = 0;
-  /** Of this page's clock [ms]: the newest message with poses. */
+  /** Of this page's clock [ms]: the newest message with poses, or the begin of a session that has sent none yet. */
   heard = 0;
-  private raises = new Map<string, EmergencyStop>();
-  private clears = new Set<string>();
+  hasPoses = false; // of this session
+  /** Hands that the person at this page has. */
+  ownHands: ReadonlySet<number> = new Set();
+  private raises = new Map<string, EmergencyStop>(); // by client, the newest (StopTruth)
+  private clears = new Map<string, number>(); // likewise, its number
+  private saysNone = false; // the server, of the raises that were heard so far; nothing was heard of it since
   private visits = new Map<string, Visit>(); // the last one of each step, by name
   private runs: RunState[] = []; // by tick
+  private earlier: Run[] = []; // by events
 
   /** Another session begins. */
   reset(): void {
-    const { link, moved, changed } = this;
-    Object.assign(this, new Session(), { link, moved: moved + 1, changed: changed + 1 });
+    const { link, moved, changed, ownHands } = this;
+    Object.assign(this, new Session(), { link, ownHands, moved: moved + 1, changed: changed + 1 });
   }
 
   /** As at the beginning: what comes is of another source. */
@@ -79,6 +90,7 @@ export class Session {
       case "/console": {
         const link = message as ConsoleState;
         if (this.link !== undefined && link.life !== this.link.life) this.reset();
+        if (link.state === "joined" && (this.link?.state !== "joined" || this.heard === 0)) this.heard = performance.now();
         this.link = link;
         break;
       }
@@ -90,6 +102,12 @@ export class Session {
         break;
       case "SceneStep":
         put(this.sceneSteps, "step", message as SceneStep);
+        break;
+      case "SceneSignal":
+        put(this.sceneSignals, "signal", message as SceneSignal);
+        break;
+      case "SceneTitle":
+        this.sceneTitle = message as SceneTitle;
         break;
       case "Telemetry":
         put(this.telemetry, "client_id", message as Telemetry);
@@ -129,16 +147,19 @@ export class Session {
         break;
       case "EmergencyStop": {
         const raise = message as EmergencyStop;
-        this.raises.set(`${raise.client_guid}/${raise.counter}`, raise);
+        if (raise.counter > (this.raises.get(raise.client_guid)?.counter ?? -1)) this.raises.set(raise.client_guid, raise);
+        this.saysNone = false;
         break;
       }
       case "EmergencyClear": {
         const clear = message as EmergencyStop;
-        this.clears.add(`${clear.client_guid}/${clear.counter}`);
+        this.clears.set(clear.client_guid, Math.max(clear.counter, this.clears.get(clear.client_guid) ?? -1));
         break;
       }
       case "NewestRaise":
         this.newestRaise = message as NewestRaise;
+        this.saysNone = this.newestRaise.standing === 0 && this.link?.state === "joined";
+        if (this.isWaiting) this.settle();
         break;
       case "EventLog":
         this.log(message as EventLog);
@@ -162,9 +183,22 @@ export class Session {
 
   private move(frame: WorldFrame): void {
     this.heard = performance.now();
+    this.hasPoses = true;
+    this.settle();
     this.tick = Math.max(this.tick, Number(frame.tick));
     for (const state of frame.states) this.states.set(state.object_id, state);
     ++this.moved;
+  }
+
+  /**
+   * The server has said that no raise stands, and still sends poses: those that were heard before are cleared, also where their clears are not told any more (StopTruth). A server
+   * that hangs may not have heard a raise that its last word does not know of: then it stands.
+   */
+  private settle(): void {
+    if (!this.saysNone) return;
+    this.raises.clear();
+    this.saysNone = false;
+    ++this.changed;
   }
 
   private feel(hand: HandState): void {
@@ -191,14 +225,24 @@ export class Session {
 
   private log(event: EventLog): void {
     if (this.events.some((known) => known.seq === event.seq && known.client_id === event.client_id)) return;
-    this.events.push(event);
-    if (this.events.length > EVENTS) this.events.shift();
+    this.list(event);
     const seconds = Number(event.tick) / 1000;
+    if (event.kind === "run") this.earlier = [...this.earlier.filter(({ tick }) => tick < event.tick), { tick: event.tick, goes: GOES.includes(event.text) }];
     if (event.kind === "step") this.visit(event.text, seconds);
     const phase = STEP_ENDS[event.kind];
     const visit = this.visits.get(event.text.replace(/ \(.*$/, ""));
     const own = /\(([\d.]+) s\)$/.exec(event.text)?.[1];
     if (phase !== undefined && visit !== undefined) Object.assign(visit, { phase, ended: seconds, seconds: own === undefined ? undefined : Number(own) });
+  }
+
+  /** By tick: a page that is opened late hears the server's events and those of the stations one after the other. */
+  private list(event: EventLog): void {
+    let at = this.events.length;
+    while (at > 0 && this.events[at - 1].tick > event.tick) --at;
+    this.events.splice(at, 0, event);
+    const isOfServer = ({ client_id }: EventLog): boolean => client_id === undefined;
+    const ofSource = this.events.filter((known) => isOfServer(known) === isOfServer(event));
+    if (ofSource.length > EVENTS) this.events.splice(this.events.indexOf(ofSource[0]), 1);
   }
 
   /** A step begins. Those after it are to be done, too, also where they were done before it began again. */
@@ -232,21 +276,31 @@ export class Session {
     });
   }
 
-  /** [s] of a step between two times [s], as StepClock of idl/types/step_clock.h counts it. */
+  /** [s] of a step between two times [s], as StepClock of idl/types/step_clock.h counts it. What was before the states of the run that were heard is known by its events. */
   private ownTime(begin: number, end: number): number {
+    const heard = this.runs.map(({ tick, phase, emergency_stop }): Run => ({ tick, goes: phase === RunPhase.Running && emergency_stop !== true }));
+    const runs = [...this.earlier.filter(({ tick }) => heard.length === 0 || tick < heard[0].tick), ...heard];
     let time = Math.max(0, end - begin);
-    this.runs.forEach((run, i) => {
-      if (run.phase === RunPhase.Running && !run.emergency_stop) return;
-      const next = this.runs[i + 1];
-      const until = next === undefined ? end : Math.min(end, Number(next.tick) / 1000);
-      time -= Math.max(0, until - Math.max(begin, Number(run.tick) / 1000));
+    runs.forEach(({ tick, goes }, i) => {
+      if (goes) return;
+      const until = runs[i + 1] === undefined ? end : Math.min(end, Number(runs[i + 1].tick) / 1000);
+      time -= Math.max(0, until - Math.max(begin, Number(tick) / 1000));
     });
     return Math.max(0, time);
   }
 
-  /** Raises of the emergency stop that no clear has named. */
+  /** Of each client the newest raise of the emergency stop, unless a clear has named it or a later one. */
   get standing(): EmergencyStop[] {
-    return [...this.raises].filter(([key]) => !this.clears.has(key)).map(([, raise]) => raise);
+    return [...this.raises.values()].filter(({ client_guid, counter }) => counter > (this.clears.get(client_guid) ?? -1));
+  }
+
+  /** One that stands, by what was heard of the raises themselves, or of the server. */
+  get raise(): Pick<EmergencyStop, "who" | "reason"> | undefined {
+    return this.standing[0] ?? ((this.newestRaise?.standing ?? 0) > 0 ? this.newestRaise : undefined);
+  }
+
+  get isRaised(): boolean {
+    return this.raise !== undefined;
   }
 
   /** A raise stands, and the server has said of the run that it is stopped: others may have heard of a raise, and it not. */
@@ -254,9 +308,9 @@ export class Session {
     return this.isRaised && this.run?.emergency_stop === true;
   }
 
-  /** By what was heard of the raises themselves, or of the server. */
-  get isRaised(): boolean {
-    return this.standing.length > 0 || (this.newestRaise?.standing ?? 0) > 0;
+  /** The server knows of a raise that stands; the run stops with its next tick. */
+  get isStopKnown(): boolean {
+    return this.isStopped || (this.newestRaise?.standing ?? 0) > 0;
   }
 
   /** It is open, and has not begun: of no object it is said where it is, only where it is to begin. */
@@ -268,7 +322,18 @@ export class Session {
     return this.run !== undefined && this.run.phase >= RunPhase.Succeeded;
   }
 
+  /** Of the scenario; that of the announcement where the server does not tell it in all languages. */
+  get title(): string {
+    return localized(this.sceneTitle?.titles ?? []) || (this.link?.title ?? "");
+  }
+
+  /** Of an object; of a hand's own one what the hand is called for the reader. */
   titleOf(id: number): string {
+    const hand = this.objects.get(id)?.kind === "pointer" ? [...this.sceneHands.values()].find(({ object_id }) => object_id === id) : undefined;
+    return hand === undefined ? this.scenarioTitleOf(id) : this.nameOfHand(hand.hand_id);
+  }
+
+  private scenarioTitleOf(id: number): string {
     const object = this.objects.get(id);
     return localized(object?.titles ?? []) || (object?.title ?? "");
   }
@@ -279,13 +344,30 @@ export class Session {
     return object === undefined ? title : this.titleOf(object.object_id);
   }
 
-  /** Title of a hand's own object, else the hand's name; both where another hand has the same title. */
+  /**
+   * What a hand is called: that of the reader by the title of its own object, which may speak to who has it; else by the role where that has one hand only, else by this title
+   * as well; the hand's name is added where another hand has the same title.
+   */
   nameOfHand(id: number): string {
     const hand = this.sceneHands.get(id);
-    const title = this.titleOf(hand?.object_id ?? NONE);
+    const title = this.scenarioTitleOf(hand?.object_id ?? NONE);
     if (title === "" || hand === undefined) return hand?.name ?? `${id}`;
-    const isShared = [...this.sceneHands.values()].some((other) => other.hand_id !== id && this.titleOf(other.object_id) === title);
+    if (!this.ownHands.has(id) && this.isAlone(hand)) return t(`role.${hand.role}` as Key);
+    const isShared = [...this.sceneHands.values()].some((other) => other.hand_id !== id && this.scenarioTitleOf(other.object_id) === title);
     return isShared ? `${title} (${hand.name})` : title;
+  }
+
+  /** A hand as a place that somebody takes: by its role, and by its name where the role has several. */
+  placeOfHand(id: number): string {
+    const hand = this.sceneHands.get(id);
+    if (hand === undefined) return `${id}`;
+    const role = t(`role.${hand.role}` as Key);
+    return this.isAlone(hand) ? role : t("hand.of", { role, hand: this.nameOfHand(id) });
+  }
+
+  /** The role has no other hand, but what tracks a person. */
+  private isAlone({ hand_id, role }: SceneHand): boolean {
+    return ![...this.sceneHands.values()].some((other) => other.hand_id !== hand_id && other.role === role && !this.isTracked(other.hand_id)) && !this.isTracked(hand_id);
   }
 
   /** Whether a hand holds this for good: its pointer, or what tracks it. */

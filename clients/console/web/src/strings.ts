@@ -5,20 +5,30 @@ import en from "./strings/en.json";
 export type Key = keyof typeof en;
 const languages: Record<string, Record<Key, string>> = { en, de };
 
-/** What this browser keeps for the page; a page that was opened as a file may have none. */
-export function kept(name: string): string | null {
+/** For whom something is kept: for all pages of this browser, or for this tab. */
+type Keeper = "browser" | "tab";
+const unkept = new Map<string, string>(); // what the browser does not keep: where site data is blocked, and of a page that was opened as a file
+const storageOf = (keeper: Keeper): Storage => (keeper === "tab" ? sessionStorage : localStorage);
+
+/** What was kept for the page. Storage throws where site data is blocked. */
+export function kept(name: string, keeper: Keeper = "browser"): string | null {
+  const own = unkept.get(`${keeper} ${name}`);
+  if (own !== undefined) return own;
   try {
-    return localStorage.getItem(name);
+    return storageOf(keeper).getItem(name);
   } catch {
     return null;
   }
 }
 
-export function keep(name: string, value: string): void {
+/** null: no longer. What cannot be kept lasts as long as this page. */
+export function keep(name: string, value: string | null, keeper: Keeper = "browser"): void {
+  unkept.delete(`${keeper} ${name}`);
   try {
-    localStorage.setItem(name, value);
+    if (value === null) storageOf(keeper).removeItem(name);
+    else storageOf(keeper).setItem(name, value);
   } catch {
-    // then it is asked for anew
+    if (value !== null) unkept.set(`${keeper} ${name}`, value);
   }
 }
 
@@ -56,7 +66,21 @@ export function n(value: number, digits: number): string {
   return written(value, { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: Math.abs(value) >= 1e4 });
 }
 
-/** Likewise with three significant digits, or fewer where the others are 0. */
+/** Minutes and seconds. */
+export function clock(seconds: number): string {
+  const whole = Math.max(0, Math.floor(seconds));
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
+}
+
+const FRAME = 0.05; // [s] by which what is shown may be older than the place that was sought
+
+/** Likewise of a session, of which what is before its first tick is less than 0. */
+export function moment(seconds: number): string {
+  const text = clock(Math.abs(seconds) + FRAME);
+  return seconds < 0 && text !== clock(0) ? `−${text}` : text;
+}
+
+/** A number with three significant digits, or fewer where the others are 0. */
 export function significant(value: number): string {
   return written(value, { maximumSignificantDigits: 3, useGrouping: false });
 }

@@ -1,42 +1,50 @@
 // What the viewer does with the picture: choose the view, cut it open, measure, hide parts. Nothing of it reaches the session.
 import * as THREE from "three";
 
-import { h, icon, type Icon } from "./dom";
+import { h, icon, renew, type Icon } from "./dom";
 import { cornersOf } from "./framing";
-import { NONE, StepPhase, type Pose } from "./messages";
 import type { Label } from "./labels";
+import { Measure } from "./measure";
+import { NONE, StepPhase, type Pose } from "./messages";
+import { PartList } from "./partlist";
+import { quaternionOf, vectorOf } from "./pose";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
-import { keep, kept, n, t, type Key } from "./strings";
+import { keep, kept, t, type Key } from "./strings";
 
 const STILL = 4; // [pixels] that a click moves at most
 const AXES = { x: new THREE.Vector3(1, 0, 0), y: new THREE.Vector3(0, 1, 0), z: new THREE.Vector3(0, 0, 1) } as const;
 type Axis = keyof typeof AXES;
 type Look = "free" | "follow" | "trainee";
-const KEYS: Record<string, string> = { "1": "free", "2": "follow", "3": "trainee", s: "section", b: "measure", w: "workspace", o: "hide", i: "isolate", a: "showall" };
+const KEYS: Record<string, string> = { "1": "free", "2": "follow", "3": "trainee", s: "section", b: "measure", w: "workspace", p: "parts", o: "hide", i: "isolate", a: "showall", v: "chase", "+": "nearer", "=": "nearer", "-": "farther", q: "left", e: "right" };
+const ZOOM = 0.9; // of the distance, by a key
+const TURN = 0.1; // [rad] likewise
 
 export class ViewTools {
   readonly element = h("div", "tools");
   look: Look = "free";
   private bar = h("div", "toolbar");
   private sectionRow = h("div", "toolrow");
-  private measureRow = h("div", "toolrow");
   private pickRow = h("div", "toolrow");
+  private said = h("p", "unseen"); // for those who do not see the scene
   private slider = Object.assign(h("input"), { type: "range", min: "0", max: "1", step: "0.002", value: "0.5" });
   private buttons = new Map<string, HTMLButtonElement>();
   private axis: Axis = "y";
   private isFlipped = false;
   private isCut = false;
-  private isMeasuring = false;
   private hasWorkspaces = false;
-  private ends: THREE.Vector3[] = [];
+  private measure: Measure;
+  private list: PartList;
   private picked?: number;
+  private chased?: number; // what is followed in place of the work
   private followed?: THREE.Vector3;
   private pressed?: { x: number; y: number };
-  private line = new THREE.Line(new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]), new THREE.LineBasicMaterial({ color: 0xd55e00, depthTest: false, transparent: true }));
-  private dots = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(1, 12, 8), new THREE.MeshBasicMaterial({ color: 0xd55e00, depthTest: false, transparent: true })));
+  private life?: number; // of the session that it is about
 
   constructor(private view: SceneView, private session: Session) {
+    this.measure = new Measure(view, session);
+    this.list = new PartList(view, session, { pick: (id) => this.pick(id), use: (id) => this.use(id), close: () => this.openList(false) });
+    this.said.setAttribute("role", "status");
     const tool = (name: string, shape: Icon, action: () => void, isSwitch = true): void => {
       const button = h("button", "tool", icon(shape));
       if (isSwitch) button.setAttribute("aria-pressed", "false");
@@ -45,22 +53,19 @@ export class ViewTools {
       this.bar.append(button);
     };
     tool("reset", "whole", () => this.reset(), false);
-    tool("follow", "follow", () => this.choose(this.look === "follow" ? "free" : "follow"));
+    tool("follow", "follow", () => this.choose(this.look === "follow" && this.chased === undefined ? "free" : "follow"));
     tool("trainee", "eye", () => this.choose(this.look === "trainee" ? "free" : "trainee"));
     tool("section", "section", () => this.section(!this.isCut));
-    tool("measure", "measure", () => this.measure(!this.isMeasuring));
+    tool("measure", "measure", () => this.setMeasuring(!this.measure.isOn));
+    tool("parts", "list", () => this.openList(!this.list.isOpen));
     tool("workspace", "sphere", () => this.showWorkspaces(!this.hasWorkspaces));
     this.showWorkspaces(kept("workspace") === "on");
     for (const axis of ["x", "y", "z"] as const) this.word(this.sectionRow, axis, () => this.place(axis, this.isFlipped));
     this.sectionRow.append(this.slider);
     this.word(this.sectionRow, "flip", () => this.place(this.axis, !this.isFlipped));
     this.slider.addEventListener("input", () => this.place(this.axis, this.isFlipped));
-    this.line.visible = false;
-    this.line.frustumCulled = false;
-    this.line.renderOrder = 4;
-    for (const dot of this.dots) Object.assign(dot, { visible: false, renderOrder: 4 });
-    view.add(this.line, ...this.dots);
-    this.element.append(this.bar, this.sectionRow, this.measureRow, this.pickRow);
+    this.element.append(this.bar, this.sectionRow, this.measure.row, this.pickRow, this.list.element, this.said);
+    this.pickRow.addEventListener("click", ({ target }) => this.act((target as HTMLElement).closest<HTMLElement>("[data-key]")?.dataset["key"]));
     view.canvas.addEventListener("pointerdown", ({ clientX: x, clientY: y, button }) => (this.pressed = button === 0 ? { x, y } : undefined));
     view.canvas.addEventListener("pointerup", (event) => this.onUp(event));
     this.setWords();
@@ -83,20 +88,29 @@ export class ViewTools {
       } else button.textContent = text;
     }
     this.slider.setAttribute("aria-label", t("tool.section.place"));
+    this.list.setWords();
+    this.measure.tell();
     this.show();
   }
 
   onKeyDown({ key }: KeyboardEvent): boolean {
     const name = KEYS[key];
-    if (name === undefined) return false;
+    this.act(name);
+    return name !== undefined;
+  }
+
+  private act(name: string | undefined): void {
     if (name === "free" || name === "follow" || name === "trainee") this.choose(name);
     if (name === "section") this.section(!this.isCut);
-    if (name === "measure") this.measure(!this.isMeasuring);
+    if (name === "measure") this.setMeasuring(!this.measure.isOn);
     if (name === "workspace") this.showWorkspaces(!this.hasWorkspaces);
-    if (name === "hide" && this.picked !== undefined) this.hide([...this.view.parts.hidden, this.picked]);
-    if (name === "isolate" && this.picked !== undefined) this.isolate(this.picked);
-    if (name === "showall") this.hide([]);
-    return true;
+    if (name === "parts") this.openList(!this.list.isOpen);
+    if (name === "hide") this.hidePicked();
+    if (name === "isolate") this.isolate();
+    if (name === "showall") this.showAll();
+    if (name === "chase") this.chase();
+    if (name === "nearer" || name === "farther") this.view.zoom(name === "nearer" ? ZOOM : 1 / ZOOM);
+    if (name === "left" || name === "right") this.view.turn(name === "left" ? -TURN : TURN);
   }
 
   private reset(): void {
@@ -104,16 +118,54 @@ export class ViewTools {
     this.view.frame();
   }
 
-  private choose(look: Look): void {
+  /** `chased`: an object that is followed in place of the work. */
+  private choose(look: Look, chased?: number): void {
     this.look = look;
+    this.chased = chased;
     this.followed = undefined;
     this.show();
   }
 
+  private openList(isOpen: boolean): void {
+    const hadFocus = this.list.element.contains(document.activeElement);
+    this.list.open(isOpen);
+    if (!isOpen && hadFocus) this.view.canvas.focus();
+    this.show();
+  }
+
+  private pick(object: number | undefined): void {
+    this.picked = object;
+    this.view.parts.mark(object);
+    this.list.follow(object);
+    this.show();
+  }
+
+  /** Enter on a part of the list: the next end of what is measured, else a closer look at it. */
+  private use(object: number): void {
+    if (this.measure.isOn) return this.measure.take(object);
+    const pose = this.session.states.get(object)?.X_WO ?? this.session.objects.get(object)?.X_WO;
+    if (pose === undefined) return;
+    this.choose("free");
+    this.view.frame(this.around({ object, pose }));
+  }
+
+  private chase(): void {
+    if (this.picked === undefined) return;
+    const isChased = this.look === "follow" && this.chased === this.picked;
+    this.choose(isChased ? "free" : "follow", isChased ? undefined : this.picked);
+    if (!isChased) this.say(t("parts.said.followed", { what: this.session.titleOf(this.picked) }));
+  }
+
+  private say(text: string): void {
+    this.said.textContent = text;
+  }
+
   /** Where the work is: the object of the step when somebody holds it, else what else somebody holds, else the object of the step, else the first hand. */
   private focus(): { object: number; pose: Pose } | undefined {
-    const { session } = this;
+    const { session, chased } = this;
     const { step } = session;
+    const own = chased === undefined ? undefined : session.states.get(chased)?.X_WO;
+    if (chased !== undefined && own !== undefined) return { object: chased, pose: own };
     const all = [...session.grabs.values()].filter(({ object_id, hand_id }) => hand_id !== NONE && !session.isOwn(object_id) && !session.isTracked(hand_id));
     const held = all.find(({ object_id }) => object_id === step?.object_id) ?? all[0];
     const object = held?.object_id ?? (step !== undefined && step.phase <= StepPhase.Active ? step.object_id : NONE);
@@ -124,22 +176,32 @@ export class ViewTools {
   /** The corners of an object's box; of none the place itself. */
   private around({ object, pose }: { object: number; pose: Pose }): THREE.Vector3[] {
     const known = this.session.objects.get(object);
-    const [centre, size] = [known?.centre ?? [0, 0, 0], known?.size ?? [0, 0, 0]].map((v) => new THREE.Vector3().fromArray(v));
-    const box = new THREE.Box3().setFromCenterAndSize(centre, size);
-    const [turn, at] = [new THREE.Quaternion().fromArray(pose.q), new THREE.Vector3().fromArray(pose.p)];
+    const box = new THREE.Box3().setFromCenterAndSize(vectorOf(known?.centre ?? [0, 0, 0]), vectorOf(known?.size ?? [0, 0, 0]));
+    const [turn, at] = [quaternionOf(pose.q), vectorOf(pose.p)];
     return [...cornersOf(box)].map((corner) => corner.applyQuaternion(turn).add(at));
   }
 
+  /** Of another session nothing is picked, or measured. */
+  private forget(): void {
+    this.life = this.session.link?.life;
+    this.chased = undefined;
+    this.measure.set(this.measure.isOn);
+    this.pick(undefined);
+  }
+
   /** Called for each frame of the display. */
-  update(): void {
+  update(now: number): void {
+    if (this.session.link?.life !== this.life) this.forget();
+    this.measure.update(now);
+    this.list.update(now);
     if (this.look === "free") return;
     const work = this.focus();
     if (work === undefined) return;
-    const focus = new THREE.Vector3().fromArray(work.pose.p);
+    const focus = vectorOf(work.pose.p);
     if (this.look === "trainee") {
       const head = [...this.session.objects.values()].find(({ kind }) => kind === "head");
       const pose = head === undefined ? undefined : this.session.states.get(head.object_id)?.X_WO;
-      const eye = pose === undefined ? new THREE.Vector3(focus.x, focus.y - 0.7, focus.z + 0.5) : new THREE.Vector3(pose.p[0], pose.p[1], pose.p[2]);
+      const eye = pose === undefined ? new THREE.Vector3(focus.x, focus.y - 0.7, focus.z + 0.5) : vectorOf(pose.p);
       if (this.followed === undefined || this.followed.distanceTo(focus) > 1e-4) this.view.lookFrom(eye, focus);
     } else if (this.followed === undefined) this.view.frame(this.around(work));
     else if (this.followed.distanceTo(focus) > 1e-4) this.view.carry(focus.clone().sub(this.followed));
@@ -178,81 +240,75 @@ export class ViewTools {
     this.view.showWorkspaces(isOn);
   }
 
-  private measure(isOn: boolean): void {
-    this.isMeasuring = isOn;
-    this.ends = [];
-    this.drawMeasure();
+  private setMeasuring(isOn: boolean): void {
+    this.measure.set(isOn);
     this.show();
-  }
-
-  private drawMeasure(): void {
-    this.dots.forEach((dot, i) => {
-      dot.visible = this.ends[i] !== undefined;
-      if (this.ends[i] !== undefined) dot.position.copy(this.ends[i]);
-      dot.scale.setScalar(4 * this.view.metresPerPixel(dot.position));
-    });
-    this.line.visible = this.ends.length === 2;
-    const places = this.line.geometry.getAttribute("position") as THREE.BufferAttribute;
-    this.ends.forEach((end, i) => places.setXYZ(i, end.x, end.y, end.z));
-    places.needsUpdate = true;
-    this.view.redraw();
   }
 
   private onUp({ clientX: x, clientY: y }: PointerEvent): void {
     const { pressed } = this;
     this.pressed = undefined;
-    if (pressed === undefined || Math.hypot(x - pressed.x, y - pressed.y) > STILL || (this.view.isHandMode && !this.isMeasuring)) return;
+    if (pressed === undefined || Math.hypot(x - pressed.x, y - pressed.y) > STILL || (this.view.isHandMode && !this.measure.isOn)) return;
     const pick = this.view.pick(x, y);
-    if (this.isMeasuring) {
-      if (pick === undefined) return;
-      this.ends = this.ends.length === 2 ? [pick.point] : [...this.ends, pick.point];
-      this.drawMeasure();
-    } else {
-      this.picked = pick?.object;
-      this.view.parts.mark(this.picked);
-    }
-    this.show();
+    if (!this.measure.isOn) this.pick(pick?.object);
+    else if (pick !== undefined) this.measure.take(pick.point);
   }
 
   private hide(ids: number[]): void {
     this.view.parts.hide(ids);
+    this.list.follow(this.picked);
     this.show();
   }
 
-  private isolate(id: number): void {
-    this.hide([...this.view.parts.all.keys()].filter((other) => other !== id));
+  /** Or shows it again. */
+  private hidePicked(): void {
+    const { picked } = this;
+    if (picked === undefined) return;
+    const { hidden } = this.view.parts;
+    const isHidden = hidden.has(picked);
+    this.hide(isHidden ? [...hidden].filter((id) => id !== picked) : [...hidden, picked]);
+    this.say(t(isHidden ? "parts.said.shown" : "parts.said.hidden", { what: this.session.titleOf(picked) }));
+  }
+
+  private isolate(): void {
+    const { picked } = this;
+    if (picked === undefined) return;
+    this.hide([...this.view.parts.all.keys()].filter((other) => other !== picked));
+    this.say(t("parts.said.alone", { what: this.session.titleOf(picked) }));
+  }
+
+  private showAll(): void {
+    this.hide([]);
+    this.say(t("parts.said.all"));
   }
 
   /** Of the measured distance. */
   labels(): Label[] {
-    if (this.ends.length < 2) return [];
-    return [{ place: this.ends[0].clone().lerp(this.ends[1], 0.5), text: `${n(1000 * this.ends[0].distanceTo(this.ends[1]), 1)} mm`, tone: "measured" }];
+    return this.measure.labels();
   }
 
   show(): void {
     const press = (name: string, isOn: boolean): void => this.buttons.get(name)?.setAttribute("aria-pressed", String(isOn));
-    press("follow", this.look === "follow");
+    press("follow", this.look === "follow" && this.chased === undefined);
     press("trainee", this.look === "trainee");
     press("section", this.isCut);
-    press("measure", this.isMeasuring);
+    press("measure", this.measure.isOn);
+    press("parts", this.list.isOpen);
     for (const axis of ["x", "y", "z"]) press(axis, this.axis === axis);
     this.sectionRow.hidden = !this.isCut;
-    this.measureRow.hidden = !this.isMeasuring;
-    const [a, b] = this.ends;
-    const mm = (metres: number): string => n(1000 * metres, 1);
-    this.measureRow.textContent =
-      b === undefined ? t(a === undefined ? "tool.measure.first" : "tool.measure.second") : t("tool.measured", { distance: mm(a.distanceTo(b)), x: mm(b.x - a.x), y: mm(b.y - a.y), z: mm(b.z - a.z) });
     const { hidden } = this.view.parts;
     const { picked } = this;
-    const word = (key: Key, action: () => void): HTMLElement => {
+    // known by their names, so that the one with the focus keeps it
+    const word = (name: string, key: Key, isPressed?: boolean): HTMLElement => {
       const button = h("button", "word", t(key));
-      button.addEventListener("click", action);
+      if (isPressed !== undefined) button.setAttribute("aria-pressed", String(isPressed));
+      button.dataset["key"] = name;
       return button;
     };
+    const ofPicked = picked === undefined ? [] : [
+      h("b", "", this.session.titleOf(picked)), word("hide", hidden.has(picked) ? "tool.show" : "tool.hide"), word("isolate", "tool.isolate"), word("chase", "tool.chase", this.chased === picked),
+    ];
     this.pickRow.hidden = picked === undefined && hidden.size === 0;
-    this.pickRow.replaceChildren(
-      ...(picked === undefined ? [] : [h("b", "", this.session.titleOf(picked)), word("tool.hide", () => this.hide([...hidden, picked])), word("tool.isolate", () => this.isolate(picked))]),
-      ...(hidden.size === 0 ? [] : [word("tool.showall", () => this.hide([]))]),
-    );
+    renew(this.pickRow, [...ofPicked, ...(hidden.size === 0 ? [] : [word("showall", "tool.showall")])]);
   }
 }

@@ -1,13 +1,15 @@
 // What a report has inside it: blocks of the page, named by `data-name`. Written by clients/report/page.cpp; SI units, loads in percent.
 
-export interface Metrics { peak_force: number; mean_force: number; contact_seconds: number; device_proxy_gap: number; field_depth: number; load_percent: number }
+/** null: samples are missing that it rests on. */
+export type Known = number | null;
+export interface Metrics { peak_force: Known; mean_force: Known; contact_seconds: Known; device_proxy_gap: Known; field_depth: Known; load_percent: Known }
 export interface Visit extends Metrics {
-  step: number; name: string; title: string; part: string; attempt: number; path: number; collisions: number; phase: string; begin: number; end: number; seconds: number; // of its own time, without pauses
-  position_error?: number; position_tolerance?: number;
+  step: number; name: string; title: string; part: string; attempt: number; path: Known; collisions: Known; phase: string; begin: number; end: number; seconds: number; // of its own time, without pauses
+  position_error?: Known; position_tolerance?: number;
 }
 export interface Summary {
   title: string; session: string; recording: string; problem: string; began_ns: number; lockstep: boolean; succeeded: boolean; outcome: string; reason: string;
-  final_hash: string; seconds: number; path: number; collisions: number; whole: Metrics; compute_seconds: { median: number; p99: number; max: number };
+  final_hash: string; seconds: number; path: Known; collisions: Known; whole: Metrics; compute_seconds: { median: number; p99: number; max: number };
   late_ticks: number; oldest_input_seconds: number; messages: number; aids: string[]; people: { name: string; role: string }[]; steps: Visit[];
   input_to_force_seconds: {
     who: string; median: number; p99: number; max: number; jitter: number; inputs_lost: number; answers_lost: number; freeze_ms: number;

@@ -1,25 +1,29 @@
 // The tables of a report. A row that stands for a moment has it in `data-time` [s].
 import { h, type Icon, icon } from "../dom";
-import { clock } from "../panels";
-import type { Metrics, Report, ReportEvent, Summary, Visit } from "./data";
-import { n } from "../strings";
-import { r, said, type Text } from "./texts";
+import type { Known, Metrics, Report, ReportEvent, Summary, Visit } from "./data";
+import { clock, n, retold, SPEAKERS } from "../strings";
+import { kindIn, r, said, type Text } from "./texts";
 
 const EVENTS_SHOWN = 200;
 const PHASES: Record<string, [Icon, string]> = { done: ["done", "good"], "timed out": ["warn", "bad"], skipped: ["skip", "warn"], abandoned: ["skip", "warn"], "not finished": ["wait", "warn"] };
 
 export type TitleOf = (visit: Visit) => string;
 
+/** Blank where it is not known. */
+const known = (value: Known, digits: number, scale = 1): string => (value === null ? "" : n(scale * value, digits));
+
 function tile(value: string, what: Text): HTMLElement {
   return h("div", "tile", h("b", "", value), h("span", "muted", r(what)));
 }
+
+const withUnit = (value: Known, unit: string): string => (value === null ? "–" : `${n(value, 1)} ${unit}`);
 
 export function tiles({ summary, steps_of_exercise: steps }: Report): HTMLElement {
   const done = summary.steps.filter(({ phase }) => phase === "done").length;
   return h(
     "div", "tiles",
-    tile(`${clock(summary.seconds)}${n(summary.seconds % 1, 1).slice(1)}`, "tile.time"), tile(`${n(summary.whole.peak_force, 1)} N`, "tile.force"),
-    tile(`${n(summary.whole.contact_seconds, 1)} s`, "tile.contact"), tile(String(summary.collisions), "tile.collisions"), tile(`${n(summary.path, 1)} m`, "tile.path"),
+    tile(`${clock(summary.seconds)}${n(summary.seconds % 1, 1).slice(1)}`, "tile.time"), tile(withUnit(summary.whole.peak_force, "N"), "tile.force"),
+    tile(withUnit(summary.whole.contact_seconds, "s"), "tile.contact"), tile(summary.collisions === null ? "–" : String(summary.collisions), "tile.collisions"), tile(withUnit(summary.path, "m"), "tile.path"),
     tile(r("of", { done, all: steps }), "tile.steps"),
   );
 }
@@ -41,20 +45,24 @@ function jump(row: HTMLElement, seconds: number, cell: Element | null): HTMLElem
   return row;
 }
 
+/** Of the whole session, of which the first step is the begin. */
+const beginOf = ({ steps: [first] }: Summary): number => first?.begin ?? 0;
+
 const cells = (values: string[]): HTMLElement[] => values.map((value) => h("td", "number", value));
 
 /** `partOf`: the title of a part in the page's language. */
 export function steps({ summary }: Report, titleOf: TitleOf, partOf: (title: string) => string): Node[] {
-  const numbers = (seconds: number, error: string, of: { path: number; collisions: number }, metrics: Metrics): HTMLElement[] =>
-    cells([n(seconds, 1), error, n(of.path, 2), String(of.collisions), n(metrics.peak_force, 1), n(metrics.mean_force, 1), n(metrics.contact_seconds, 1)]);
+  const numbers = (seconds: number, error: string, of: { path: Known; collisions: Known }, metrics: Metrics): HTMLElement[] =>
+    cells([n(seconds, 1), error, known(of.path, 2), known(of.collisions, 0), known(metrics.peak_force, 1), known(metrics.mean_force, 1), known(metrics.contact_seconds, 1)]);
   const rows = summary.steps.map((visit, i) => {
-    const error = visit.position_error === undefined ? "" : r("of", { done: n(1e3 * visit.position_error, 2), all: n(1e3 * (visit.position_tolerance ?? 0), 1) });
+    const error = visit.position_error === undefined || visit.position_error === null ? "" : r("of", { done: n(1e3 * visit.position_error, 2), all: n(1e3 * (visit.position_tolerance ?? 0), 1) });
     const [name, tone] = PHASES[visit.phase] ?? ["wait", "warn"];
     const title = h("td", "name", titleOf(visit), ...(visit.part === "" ? [] : [h("small", "muted", partOf(visit.part))]));
     const result = h("td", "", h("span", `badge ${tone}`, icon(name), said(visit.phase)));
     return jump(h("tr", "", h("td", "number", String(i + 1)), title, ...numbers(visit.seconds, error, visit, visit), result), visit.begin, title);
   });
-  rows.push(h("tr", "sum", h("td"), h("td", "name", r("whole")), ...numbers(summary.seconds, "", summary, summary.whole), h("td")));
+  const whole = h("td", "name", r("whole"));
+  rows.push(jump(h("tr", "sum", h("td"), whole, ...numbers(summary.seconds, "", summary, summary.whole), h("td")), beginOf(summary), whole));
   const made = table("steps-table", ["step", "step", "step.time", "step.error", "step.path", "step.collisions", "step.peak", "step.mean", "step.contact", "step.result"], rows);
   made.querySelectorAll("th")[1].textContent = r("step");
   return [h("h2", "", r("steps")), made, h("p", "remark", r("steps.note"))];
@@ -68,7 +76,7 @@ export function textOf(event: ReportEvent, words: (event: ReportEvent) => string
 
 export function events(report: Report, words: (event: ReportEvent) => string): Node[] {
   const rows = report.events.map((event, i) => {
-    const kind = h("td", "", h("span", event.tone === "" ? "muted" : `tone ${event.tone}`, said(event.kind)));
+    const kind = h("td", "", h("span", event.tone === "" ? "muted" : `tone ${event.tone}`, kindIn(event.kind)));
     const row = jump(h("tr", "", h("td", "number muted", `${n(event.time, 1)} s`), kind, h("td", "", textOf(event, words))), event.time, kind);
     row.hidden = i >= EVENTS_SHOWN;
     return row;
@@ -77,7 +85,7 @@ export function events(report: Report, words: (event: ReportEvent) => string): N
   const others = Object.entries(report.other_events);
   const notes = [
     ...(report.unlisted_events > 0 ? [r("events.left", { count: report.unlisted_events })] : []),
-    ...(others.length > 0 ? [r("events.others", { count: others.reduce((sum, [, count]) => sum + count, 0), kinds: others.map(([kind, count]) => `${count} ${said(kind)}`).join(", ") })] : []),
+    ...(others.length > 0 ? [r("events.others", { count: others.reduce((sum, [, count]) => sum + count, 0), kinds: others.map(([kind, count]) => `${count} ${kindIn(kind)}`).join(", ") })] : []),
   ];
   const all = h("button", "all-events", r("events.all", { count: rows.length }));
   all.hidden = rows.length <= EVENTS_SHOWN;
@@ -90,10 +98,14 @@ export function events(report: Report, words: (event: ReportEvent) => string): N
 
 /** What describes the simulation more than the trainee. */
 export function engineers({ summary }: Report, titleOf: TitleOf): Node[] {
-  const row = (number: string, title: string, of: Metrics): HTMLElement =>
-    h("tr", number === "" ? "sum" : "", h("td", "number", number), h("td", "name", title), ...cells([n(1e3 * of.device_proxy_gap, 2), n(1e3 * of.field_depth, 2), n(of.load_percent, 0)]));
-  const rows = summary.steps.map((visit, i) => row(String(i + 1), titleOf(visit), visit));
-  rows.push(row("", r("whole"), summary.whole));
+  const row = (number: string, title: HTMLElement, of: Metrics): HTMLElement =>
+    h("tr", number === "" ? "sum" : "", h("td", "number", number), title, ...cells([known(of.device_proxy_gap, 2, 1e3), known(of.field_depth, 2, 1e3), known(of.load_percent, 0)]));
+  const rows = summary.steps.map((visit, i) => {
+    const title = h("td", "name", titleOf(visit));
+    return jump(row(String(i + 1), title, visit), visit.begin, title);
+  });
+  const whole = h("td", "name", r("whole"));
+  rows.push(jump(row("", whole, summary.whole), beginOf(summary), whole));
   const made = table("", ["step", "step", "engineers.gap", "engineers.depth", "engineers.load"], rows);
   made.querySelectorAll("th")[1].textContent = r("step");
   return [h("h2", "", r("engineers")), made, h("p", "remark", r("engineers.note"))];
@@ -103,12 +115,12 @@ export function performance({ summary }: Report): Node[] {
   const times = (of: { median: number; p99: number; max: number }, digits: number): string =>
     r("performance.times", { median: n(1e3 * of.median, digits), p99: n(1e3 * of.p99, digits), max: n(1e3 * of.max, digits) });
   const link = (of: Summary["input_to_force_seconds"][number]): string =>
-    `${of.who}: ${r("performance.losses", { jitter: n(1e3 * of.jitter, 1), inputs: n(1e2 * of.inputs_lost, 2), contacts: n(1e2 * of.answers_lost, 2), freeze: String(of.freeze_ms) })}` +
+    `${retold(of.who, ...SPEAKERS)}: ${r("performance.losses", { jitter: n(1e3 * of.jitter, 1), inputs: n(1e2 * of.inputs_lost, 2), contacts: n(1e2 * of.answers_lost, 2), freeze: String(of.freeze_ms) })}` +
     (of.round_trip === null ? "" : `; ${r("performance.clock", { trip: n(1e3 * of.round_trip, 1), error: n(1e3 * (of.clock_error ?? 0), 1) })}`);
   const facts: [Text, string][] = [
     ["performance.compute", times(summary.compute_seconds, 3)], ["performance.late", String(summary.late_ticks)],
     ["performance.input", `${n(1e3 * summary.oldest_input_seconds, 1)} ms`],
-    ...summary.input_to_force_seconds.map((latency): [Text, string] => ["performance.latency", `${latency.who}: ${times(latency, 1)}`]),
+    ...summary.input_to_force_seconds.map((latency): [Text, string] => ["performance.latency", `${retold(latency.who, ...SPEAKERS)}: ${times(latency, 1)}`]),
     ...summary.input_to_force_seconds.map((latency): [Text, string] => ["performance.link", link(latency)]),
     ["performance.aids", summary.aids.length === 0 ? r("performance.none") : summary.aids.map(said).join("; ")],
   ];

@@ -1,4 +1,5 @@
 // The texts of a report that the console does not have: one file a language.
+import { kindOf } from "../eventtext";
 import { filled, language, n } from "../strings";
 import de from "./de.json";
 import en from "./en.json";
@@ -15,6 +16,12 @@ export function said(text: string): string {
   const numbers: string[] = [];
   const known = (TEXTS[language] ?? en).said[text.replace(/\d+(?:\.\d+)?/g, (number) => (numbers.push(number), "#"))];
   return known === undefined ? text : known.replace(/#/g, () => localNumber(numbers.shift() ?? ""));
+}
+
+/** The kind of an event: by the report's own word, or the console's. */
+export function kindIn(kind: string): string {
+  const word = said(kind);
+  return word === kind && language !== "en" ? kindOf({ kind }) : word;
 }
 
 function localNumber(number: string): string {
