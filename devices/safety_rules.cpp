@@ -13,7 +13,7 @@ constexpr double kActiveSpeed = 0.01;         ///< [m/s] active power = peak for
 constexpr double kDeratingStart = 0.8;        ///< [-] motor heat above which the force limit falls
 /// [m] from the wrist to the grip: a force of the soft start there is a torque of the wrist.
 constexpr double kWristLever = 0.1;
-constexpr double kMinDampedSpeed = 1e-4;  ///< [m/s], [rad/s] no damping is injected below
+constexpr double kDeficitTravel = 1e-3;  ///< [m] deficit of the whole damping = peak force along it
 
 /// K <= b / (T/2 + delay): Colgate's passivity condition with a transport delay. `limit` caps the result.
 double maxPassiveStiffness(double limit, double damping, const DeviceCaps& caps) {
@@ -176,20 +176,11 @@ void PassivityObserver::observe(const Wrench& output, const Displacement& motion
 
 Wrench PassivityObserver::damping(const Twist& V_DH, double dt, const SafetyLimits& limits) const noexcept {
   if (energy_ >= 0.0) return {};
-  Wrench wrench;
-  double deficit = -energy_;
-  const double speed2 = V_DH.linear.squaredNorm();
-  if (speed2 > kMinDampedSpeed * kMinDampedSpeed) {
-    const double damping = std::min(deficit / (dt * speed2), limits.injected_damping);
-    wrench.force = -damping * V_DH.linear;
-    deficit -= damping * speed2 * dt;
-  }
-  const double turning2 = V_DH.angular.squaredNorm();
-  if (turning2 > kMinDampedSpeed * kMinDampedSpeed) {
-    const double damping = std::min(deficit / (dt * turning2), limits.injected_rotational_damping);
-    wrench.torque = -damping * V_DH.angular;
-  }
-  return wrench;
+  const double share = std::min(1.0, -energy_ / (limits.peak_force * kDeficitTravel));
+  const Wrench wrench{-share * limits.injected_damping * V_DH.linear,
+                      -share * limits.injected_rotational_damping * V_DH.angular};
+  const double dissipated = -dt * (wrench.force.dot(V_DH.linear) + wrench.torque.dot(V_DH.angular));
+  return dissipated > -energy_ ? wrench * (-energy_ / dissipated) : wrench;
 }
 
 }  // namespace tenon::devices

@@ -114,9 +114,10 @@ class MotorThermalModel {
 /// Time-domain passivity observer and controller at the port between device and hand (Hannaford and Ryu
 /// 2002).
 ///
-/// Two departures from the paper, because other people's forces make the shared scene active: the stored
+/// Three departures from the paper. Because other people's forces make the shared scene active, the stored
 /// energy is bounded, so that energy dissipated by long friction cannot be returned in a burst later; and a
-/// small power may be delivered at any time.
+/// small power may be delivered at any time. And the damping grows with the deficit, instead of dissipating
+/// it within one step: that chatters with the noise of a velocity, which a hand that is led feels as a buzz.
 ///
 /// Threads: one. Real-time: everything.
 class PassivityObserver {
@@ -124,8 +125,8 @@ class PassivityObserver {
   /// The hand moved by `motion` within `dt` [s] while the device applied `output`.
   void observe(const Wrench& output, const Displacement& motion, double dt,
                const SafetyLimits& limits) noexcept;
-  /// Damping wrench, in D, that dissipates a negative balance within `dt` [s], limited to the damping that
-  /// may be injected.
+  /// Damping wrench, in D, in proportion to a negative balance: the most that may be injected from a deficit
+  /// of the peak force along 1 mm on. It takes no more than the deficit within `dt` [s].
   [[nodiscard]] Wrench damping(const Twist& V_DH, double dt, const SafetyLimits& limits) const noexcept;
   /// [J] energy balance: taken from the hand minus delivered to it.
   [[nodiscard]] double energy() const noexcept { return energy_; }

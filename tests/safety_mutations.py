@@ -175,6 +175,8 @@ RULES = [
      "VirtualFixture.GrowsByTwentyNewtonsASecondAndStaysBelowItsLimit:VirtualFixture.AJumpOfTheFixtureIsNoJumpOfTheForce"),
     ("who holds against a fixture", [(FIXTURE, r"  p_HA_W = clampNorm\([^;]*;\n", "")], "clients_haptic_tests", "VirtualFixture.AHandThatIsLetGoOfIsNotThrown"),
     ("a fixture adds energy", [(FIXTURE, r"wrench\.force -= damping", "wrench.force += damping")], "clients_haptic_tests", "*VirtualFixtureEnergy.ACycleOfTheHandTakesEnergyAndGivesNone*"),
+    ("a hand that is led, or an unstable loop", [("devices/safety_rules.cpp", r"const double share = [^;]*;", "const double share = 1.0;")], "devices_tests",
+     "Safety.TheDampingOfAHandThatIsLedDoesNotChatter"),
     ("contact and fixture together", [(HAND, r"    request\.stiffness \+= coupling_\.stiffness\(\);\n", "")], "clients_haptic_tests",
      "*SpringsInParallelAreWithinWhatTheDeviceRendersStably*"),
     ("the instructor's station dies", [(FIXTURE, r"age_ <= kStaleAt &&", "")], "clients_haptic_tests", "*VirtualFixtureEnd.*"),

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -171,6 +172,23 @@ TEST(Safety, InjectsNoDampingIntoALosslessSpring) {
     (void)safety.step(requestForce({-1000.0 * middle, 0.0, 0.0}), state, kTick);
     EXPECT_FALSE(safety.acts(SafetyRule::kPassivity)) << tick;
   }
+}
+
+// as of an instructor's hand that leads: the force acts along the motion, whose measured velocity is noisy
+TEST(Safety, TheDampingOfAHandThatIsLedDoesNotChatter) {
+  Safety safety = settled(kSigma, {3.0, 0.0, 0.0});
+  DeviceState state = armed();
+  double last = 3.0, damping = 0.0;
+  for (int tick = 0; tick < 600; ++tick) {
+    state.V_DH.linear.x() = tick % 2 == 0 ? 0.11 : 0.09;  // [m/s]
+    state.X_DH.translation().x() += kTick * 0.1;
+    const double force = safety.step(requestForce({3.0, 0.0, 0.0}), state, kTick).F_Ho_D.force.x();
+    EXPECT_LE(std::abs(force - last), kSigma.injected_damping * 0.02) << "the noise alone, at " << tick;
+    last = force;
+    damping = 3.0 - force;
+  }
+  EXPECT_GT(damping, 0.5);
+  EXPECT_LE(last * 0.1, safetyLimits(kSigma).active_power + 0.05) << "what it delivers";
 }
 
 TEST(Safety, BrakesAboveTheSpeedLimitWithHysteresis) {

