@@ -185,10 +185,9 @@ std::optional<Tick> Recording::follow(const wire::RawSample& sample) {
       if constexpr (std::same_as<M, HandState>)
         // the input of each tick has its number; what is far off is not of this session
         if (session_.lockstep) tick = std::min<Tick>(message->seq, newest_tick_ + kMostAhead);
-      if constexpr (std::same_as<M, WorldFrame>) {
-        if (first_tick_ == 0) first_tick_ = *tick;
-        newest_tick_ = std::max(newest_tick_, *tick);
-      }
+      if constexpr (std::same_as<M, WorldFrame> || std::same_as<M, HandManifold>)
+        if (*tick > 0) first_tick_ = first_tick_ == 0 ? *tick : std::min(first_tick_, *tick);
+      if constexpr (std::same_as<M, WorldFrame>) newest_tick_ = std::max(newest_tick_, *tick);
       if constexpr (std::same_as<M, TickInputPart>) count(*message);
       if (!keeps(*message, sample)) tick.reset();
       if constexpr (std::same_as<M, RunState>) run_ = std::move(*message);
@@ -209,7 +208,7 @@ Recording::Period Recording::periodOf(Tick tick) const {
   return {life_, tick == 0 ? 0 : (tick - 1) / kPublishedSamplesPeriod + 1};
 }
 
-/// Frames may arrive before the answer that says when this recorder joined.
+/// Frames and manifolds may arrive before the answer that says when this recorder joined.
 Tick Recording::heardAfter() const { return first_tick_ == 0 ? joined_ : std::min(joined_, first_tick_ - 1); }
 
 bool Recording::isNew(const TickInputPart& part) {
@@ -254,6 +253,24 @@ TopicCount Recording::inputCount() const {
   return count;
 }
 
+/// Periods follow each other without a gap, so those between two statements were stated, too. What a resumed
+/// server stated before this recorder was back cannot be known.
+TopicCount Recording::statementCount() const {
+  TopicCount count{std::string(wire::kPublishedSamples.name), 0, 0};
+  std::optional<Period> before;
+  for (const auto& [period, published] : published_) {
+    if (period.life == 0 && published.first_tick <= heardAfter()) continue;
+    const Tick begin = (heardAfter() + kPublishedSamplesPeriod - 1) / kPublishedSamplesPeriod;
+    const Tick last = before && before->life == period.life ? before->number
+                      : period.life == 0                    ? begin
+                                                            : period.number - 1;
+    count.published += period.number - std::min(last, period.number - 1);
+    ++count.recorded;
+    before = period;
+  }
+  return count;
+}
+
 std::vector<TopicCount> Recording::counts() const {
   std::vector<TopicCount> all;
   std::map<std::string, TopicCount> by_topic;
@@ -274,6 +291,7 @@ std::vector<TopicCount> Recording::counts() const {
     }
   }
   by_topic[std::string(wire::kTickInput.name)] = inputCount();
+  by_topic[std::string(wire::kPublishedSamples.name)] = statementCount();
   for (auto& [topic, count] : by_topic) {
     count.topic = topic;
     if (count.published > 0) all.push_back(count);

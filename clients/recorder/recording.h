@@ -74,8 +74,9 @@ class Recording {
   [[nodiscard]] RecorderStatus status() const;
   [[nodiscard]] const std::string& problem() const { return status_.problem; }
   /// What was recorded and what was published, by topic, since joined(): of inputs all ticks, of the rest
-  /// the periods that the server has stated and of which no further samples are expected. What a resumed
-  /// server published before this recorder was back is missing too.
+  /// the periods that the server has stated and of which no further samples are expected. A period whose
+  /// statement is missing counts as one sample of PublishedSamples. What a resumed server published before
+  /// this recorder was back is missing too.
   [[nodiscard]] std::vector<TopicCount> counts() const;
   /// Whether the run is over and the server has stated what it published up to its end.
   [[nodiscard]] bool hasStatement() const;
@@ -118,6 +119,7 @@ class Recording {
   /// The tick after which samples of the server are expected.
   [[nodiscard]] Tick heardAfter() const;
   [[nodiscard]] TopicCount inputCount() const;
+  [[nodiscard]] TopicCount statementCount() const;
   void keepProblem(const Result<void>& done);
 
   /// Parts of the journal come in this order.
@@ -135,7 +137,8 @@ class Recording {
   std::map<std::string, std::uint16_t, std::less<>> channels_;
   RecorderStatus status_;
   std::optional<RunState> run_;
-  Tick first_tick_ = 0, newest_tick_ = 0;  ///< of WorldFrame
+  Tick first_tick_ = 0;   ///< of WorldFrame and HandManifold
+  Tick newest_tick_ = 0;  ///< of WorldFrame
   Tick joined_ = 0;
   /// Of PublishedSamples: a resumed server states what it published of a period that a former one began.
   struct Period {
