@@ -62,8 +62,8 @@ std::optional<std::string> JournalWriter::problem() const {
   return problem_;
 }
 
-/// Writes up to kBatch entries; true: there may be more.
-bool JournalWriter::writePending(bool inline_copies) {
+/// Writes up to kBatch entries, which are in batch_ then; their number.
+std::size_t JournalWriter::writeBatch() {
   const auto writes = [this] { return journal_ && !problem(); };
   std::size_t count = 0;
   for (; count < kBatch; ++count) {
@@ -79,10 +79,14 @@ bool JournalWriter::writePending(bool inline_copies) {
     entries_.pop();
   }
   if (writes()) keepProblem(journal_->keep());
+  return count;
+}
+
+/// True: there may be more.
+bool JournalWriter::writePending() {
+  const std::size_t count = writeBatch();
   for (std::size_t i = 0; publish_ && i < count; ++i) {
-    if (inline_copies) {
-      publish_(batch_[i]);
-    } else if (JournalEntry* const copy = copies_.beginPush()) {
+    if (JournalEntry* const copy = copies_.beginPush()) {
       *copy = std::move(batch_[i]);
       copies_.commitPush();
     }
@@ -90,9 +94,37 @@ bool JournalWriter::writePending(bool inline_copies) {
   return count == kBatch;
 }
 
-void JournalWriter::writeNow() {
-  while (writePending(true)) {
+bool JournalWriter::isWrittenWithin(std::chrono::steady_clock::duration patience) {
+  if (!file_thread_.joinable()) file_thread_ = std::thread([this] { writeWhenAsked(); });
+  const auto until = std::chrono::steady_clock::now() + patience;
+  while (true) {
+    std::unique_lock lock(turn_mutex_);
+    if (entries_.size() > 0 && !asked_) {
+      asked_ = true;
+      turn_.notify_all();
+    }
+    if (!turn_.wait_until(lock, until, [this] { return !asked_; })) return false;
+    const std::size_t count = std::exchange(written_now_, 0);
+    for (std::size_t i = 0; publish_ && i < count; ++i) publish_(batch_[i]);
+    if (entries_.size() == 0) return true;
   }
+}
+
+void JournalWriter::writeWhenAsked() {
+  threads::nameThisThread("journal");
+  std::unique_lock lock(turn_mutex_);
+  while (true) {
+    turn_.wait(lock, [this] { return asked_ || ending_; });
+    if (!asked_) break;
+    lock.unlock();
+    const std::size_t count = writeBatch();
+    lock.lock();
+    written_now_ = count;
+    asked_ = false;
+    turn_.notify_all();
+  }
+  lock.unlock();
+  closeFile();
 }
 
 void JournalWriter::start() {
@@ -106,10 +138,14 @@ void JournalWriter::writeFile() {
   static_cast<void>(threads::raiseThisThread(kFilePriority));
   while (true) {
     const bool last_pass = ending_;  // no further entries will come
-    if (writePending(false)) continue;
+    if (writePending()) continue;
     if (last_pass) break;
     std::this_thread::sleep_for(kPass);
   }
+  closeFile();
+}
+
+void JournalWriter::closeFile() {
   written_ = true;
   if (outcome_ && journal_ && !problem()) keepProblem(journal_->close(*outcome_));
   ended_ = true;
@@ -135,8 +171,14 @@ void JournalWriter::giveCopies() {
 
 void JournalWriter::end(const RunState& run) {
   outcome_ = run;
-  ending_ = true;
+  beEnding();
   if (!file_thread_.joinable()) file_thread_ = std::thread([this] { writeFile(); });
+}
+
+void JournalWriter::beEnding() {
+  const std::lock_guard lock(turn_mutex_);
+  ending_ = true;
+  turn_.notify_all();
 }
 
 bool JournalWriter::isEndedWithin(std::chrono::steady_clock::duration patience) {
@@ -151,7 +193,7 @@ void JournalWriter::leaveFile() {
 }
 
 void JournalWriter::stop() {
-  ending_ = true;
+  beEnding();
   if (file_thread_.joinable()) file_thread_.join();
   written_ = true;
   if (copy_thread_.joinable()) copy_thread_.join();

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <mutex>
@@ -22,8 +23,8 @@ namespace tenon::session {
 /// seconds behind, so that the file has a gap; a copy, when a recorder is, so that its recording has one.
 /// When the file cannot be written any more it ends there, and copies continue.
 ///
-/// Threads: add from one (tick); start, end and stop from another; writes, with the end of the file, and
-/// copies have threads of their own up to stop. The numbers from any. Real-time: add.
+/// Threads: add from one (tick); start, isWrittenWithin, end and stop from another; writes, with the end of
+/// the file, and copies have threads of their own up to stop. The numbers from any. Real-time: add.
 class JournalWriter {
  public:
   using Publish = std::function<void(const JournalEntry&)>;
@@ -49,8 +50,9 @@ class JournalWriter {
   /// In place of stop, when the disk hangs: ends the copies. Then only the end of the process ends what waits
   /// for the disk; the destructor waits for it.
   void leaveFile();
-  /// Without start (lockstep): writes what was added and gives the copies away, here.
-  void writeNow();
+  /// Without start (lockstep): true once what was added is in the file, whose thread it has too, and its
+  /// copies are given away, here. False: the disk has not taken it within `patience`, to be called again.
+  [[nodiscard]] bool isWrittenWithin(std::chrono::steady_clock::duration patience);
 
   /// Why the file has ended before the session, or is not whole; none while it is written.
   [[nodiscard]] std::optional<std::string> problem() const;
@@ -61,8 +63,12 @@ class JournalWriter {
 
  private:
   bool acquireBuffer(JournalEntry& entry) noexcept;
-  bool writePending(bool inline_copies);
+  std::size_t writeBatch();
+  bool writePending();
   void writeFile();
+  void writeWhenAsked();
+  void closeFile();
+  void beEnding();
   void giveCopies();
   void keepProblem(const Result<void>& done);
 
@@ -82,7 +88,12 @@ class JournalWriter {
   std::optional<RunState> outcome_;  ///< before ending_
   std::atomic<bool> ending_ = false, written_ = false, ended_ = false;
   std::thread file_thread_, copy_thread_;
-  mutable std::mutex mutex_;  ///< of problem_
+  // lockstep
+  std::mutex turn_mutex_;  ///< of asked_
+  std::condition_variable turn_;
+  bool asked_ = false;           ///< the file's thread is to write, or writes
+  std::size_t written_now_ = 0;  ///< entries of batch_, while not asked
+  mutable std::mutex mutex_;     ///< of problem_
   std::optional<std::string> problem_;
 };
 

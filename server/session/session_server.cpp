@@ -135,6 +135,7 @@ class Server final : public SessionServer {
   void runLockstep(const std::atomic<bool>& stop);
   void runRealTime(const std::atomic<bool>& stop);
   bool awaitInputs(const std::atomic<bool>& stop);
+  bool awaitJournal(const std::atomic<bool>& stop);
   void realTimeTick() noexcept;
   /// Publisher::prepare.
   void publish(TickOutput& output, bool is_newest) {
@@ -262,11 +263,26 @@ void Server::runLockstep(const std::atomic<bool>& stop) {
     // in the file before anybody has the answer, so that no client is ahead of a server that is resumed
     if (journal_) {
       journal_->add(input, output.hash, simulation_);
-      journal_->writeNow();
+      if (!awaitJournal(stop)) break;
       noticeJournal();
     }
     publish(output, true);
   }
+}
+
+/// Until the tick is in the journal's file; false: it was ended before. Meanwhile messages are handled.
+bool Server::awaitJournal(const std::atomic<bool>& stop) {
+  std::optional until_told = std::chrono::steady_clock::now() + kJournalPatience;
+  while (!journal_->isWrittenWithin(milliseconds(20))) {
+    if (stop || wire_->replaced()) return false;
+    if (until_told && std::chrono::steady_clock::now() >= *until_told) {
+      until_told.reset();
+      wire_->log(Severity::kError, "journal",
+                 "the session waits for the journal's disk; Ctrl-C ends it without the rest of the journal");
+    }
+    wire_->dispatch(milliseconds(0));
+  }
+  return true;
 }
 
 /// Waits until a hand is controlled and every controlled hand has an input for the next tick; a client that

@@ -119,7 +119,7 @@ TEST_F(JournalWriterTest, ACopyIsGivenAwayOnlyOnceItsEntryOutlivesTheProcess) {
   for (Tick tick = 1; tick <= 5; ++tick) {
     simulation_.tick(test::playInput(tick));
     writer.add(test::playInput(tick), simulation_.hash(), simulation_);
-    writer.writeNow();
+    ASSERT_TRUE(writer.isWrittenWithin(std::chrono::minutes(1)));
   }
   EXPECT_EQ(newest, 5U);
   EXPECT_FALSE(is_behind);
@@ -145,13 +145,32 @@ TEST_F(JournalWriterTest, AFullDiskEndsTheFileAndNotTheCopies) {
   EXPECT_EQ(copies, 1000U);
 }
 
+TEST_F(JournalWriterTest, InLockstepATickThatTheDiskDoesNotTakeIsAskedForAgainAndCopiedOnce) {
+  std::vector<Tick> copies;
+  JournalWriter writer(openJournal(), [&](const JournalEntry& entry) { copies.push_back(entry.input.tick); });
+  play(writer, 2);
+  ASSERT_TRUE(writer.isWrittenWithin(std::chrono::minutes(1)));
+  test::HangingDisk disk(file_);
+  play(writer, 1);
+  for (int times = 0; times < 2; ++times)
+    EXPECT_FALSE(writer.isWrittenWithin(std::chrono::milliseconds(100)));
+  EXPECT_THAT(copies, testing::ElementsAre(1, 2));
+  disk.release();
+  EXPECT_TRUE(writer.isWrittenWithin(std::chrono::minutes(1)));
+  EXPECT_TRUE(writer.isWrittenWithin(std::chrono::milliseconds(0))) << "nothing was added";
+  EXPECT_THAT(copies, testing::ElementsAre(1, 2, 3));
+  writer.stop();
+}
+
 // All ticks are written, and the disk hangs with the end of the file alone.
 TEST_F(JournalWriterTest, AnEndThatTheDiskDoesNotTakeIsWaitedForAsTicksAre) {
   for (const bool has_thread : {true, false}) {
     JournalWriter writer(openJournal(), {});
     if (has_thread) writer.start();
     play(writer, 5);
-    if (!has_thread) writer.writeNow();
+    if (!has_thread) {
+      ASSERT_TRUE(writer.isWrittenWithin(std::chrono::minutes(1)));
+    }
     while (writer.waitingEntries() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     std::this_thread::sleep_for(std::chrono::milliseconds(50));  // up to the end of its pass
     test::HangingDisk disk(file_);

@@ -172,6 +172,39 @@ TEST(SessionServer, TheEndOfARunIsPublishedWithoutTheJournalsDiskWhichASecondSig
   std::filesystem::remove_all(folder);
 }
 
+TEST(SessionServer, InLockstepItSaysThatItWaitsForTheJournalsDiskAndEndsWithoutIt) {
+  const auto folder = std::filesystem::temp_directory_path() / ("tenon-waits-" + std::to_string(getpid()));
+  const auto file = folder / "journal.mcap";
+  std::atomic<std::uint32_t> signals = 0;
+  std::atomic<bool> ends = false;
+  std::optional<test::HangingDisk> disk;
+  {
+    SessionOptions options{.name = "waits", .lockstep = true, .wait_for = {"right"}, .journal = file};
+    options.signals = &signals;
+    options.print = [&](const std::string& line) {
+      ends = ends || line.starts_with("waiting for the journal's disk; Ctrl-C ends the server");
+    };
+    RunningServer server(options);
+    test::ScriptedClient client("waits", wire::LinkProfile::kLockstep);
+    ASSERT_TRUE(client.join("right", Role::kTrainee, {"right"}));
+    runInLockstep(client, 1, 5);
+    disk.emplace(file);
+    client.sendPose(6, test::rightHandAt(6));
+    ASSERT_TRUE(client.receivesUntil([&] {
+      return !client.events.empty() &&
+             client.events.back().text.starts_with("the session waits for the journal");
+    }));
+    EXPECT_EQ(client.newest.tick, 5U) << "nobody is ahead of the file";
+    ++signals;
+    server.stop();
+    ASSERT_TRUE(client.receivesUntil([&] { return isOver(client.run.phase) && ends; }));
+    ++signals;
+    EXPECT_TRUE(server.end().left_journal);
+    disk->release();  // the destructor waits for it
+  }
+  std::filesystem::remove_all(folder);
+}
+
 TEST(SessionServer, RefusesToWaitForAnUnknownHandOrRole) {
   const auto server =
       SessionServer::open(test::smallSession(), {.domain = test::ownDomain(), .wait_for = {"third"}});
