@@ -42,7 +42,7 @@ RULES = [
     ("a device is armed from afar", [(ARMING, r"return armed_ && !stopped_;", "return !stopped_;")], "clients_haptic_tests", "Arming.NothingButThePersonArms"),
     ("a killed server is resumed and moves", [("server/simulation/environment_hands.cpp", r"kGraspReach = 5e-3", "kGraspReach = 5e3")],
      "server_session_tests", "ReturningHand.HoldsItsObjectAgainWhereItHeldIt"),
-    ("a recorder that hangs, or a full disk", [(WRITER, r"writePending\(false\)", "writePending(true)"), (WRITER, r"publish_ && i < count;", "publish_ && i < count && !problem();")],
+    ("a recorder that hangs, or a full disk", [(WRITER, r"if \(writePending\(\)\) continue;", "const std::size_t n = writeBatch();\n    for (std::size_t i = 0; publish_ && i < n; ++i) publish_(batch_[i]);\n    if (n == kBatch) continue;"), (WRITER, r"publish_ && i < count;", "publish_ && i < count && !problem();")],
      "server_session_tests", "JournalWriterTest.AReaderThatHangsLeavesNoGapInTheFile:JournalWriterTest.AFullDiskEndsTheFileAndNotTheCopies"),
     ("a client fills the queue", [("server/session/contributions.h", r"waiting\.size\(\) < kMostOfClient", "true"), ("server/session/contributions.h", r" \|\| isFull\(\)", "")],
      "server_session_tests", "Contributions.LeaveHalfOfTheQueueToCommands"),

@@ -158,6 +158,35 @@ class MentoringNightly(unittest.TestCase):
                 self.assertGreater(len(rest), 40)  # of 50, as far hands state 25 a second
                 self.assertLess(max(math.dist(place, rest[0]) for place in rest), 5e-4, f"hand {hand} swings")
 
+    def test_over_a_link_too_long_for_contacts_a_hand_is_led_and_everybody_is_told(self):
+        with Link(delay=0.17, jitter=0.005, loss=0.02, burst=3, seed=2) as link, Machines(link) as machines:
+            near, far = ["--network", "wan"], ["--network", f"wan,{A}", "--key", machines.key]
+            (machines.out / "path.csv").write_text(PATH, encoding="utf-8")
+            server = machines.start(0, "serve", PEG, "--wait-for", "right,instructor,recorder", *near)
+            server.wait_until_open(600)
+            recorder = machines.start(0, "record", "-o", machines.out / "session.mcap", *near)
+            recorder.wait_for("recording", 60)
+            hands = ["--tracker", "none", "--device", "sigma7-sim", "--arm", "--wait", 60]
+            trainee = machines.start(1, "trainee", "--person", "none", *hands, *far)
+            machines.start(0, "instructor", "--person", machines.out / "path.csv", *hands, *near)
+            server.wait_for("run: running", 60)
+            told = "contacts are not felt over this link: 1[678][0-9] ms one way"
+            trainee.wait_for(told, 30)
+            server.wait_for(f"right.*{told}|{told}", 30)
+            people = machines.start(0, "command", *near, "list")
+            self.assertEqual(people.wait(60), 0)
+            self.assertIn("contacts are not felt, more than 150 ms one way", people.text())
+            for words in (["guide", "show", "right"], ["guide", "off", "right"], ["stop"]):
+                self.assertEqual(machines.start(0, "command", *near, *words).wait(60), 0)
+                time.sleep(10 if words[1:2] == ["show"] else 2)
+            self.assertEqual(trainee.text().count("contacts are not felt"), 1, "said once")
+            self.assertEqual(recorder.wait(60), 0, recorder.text())
+            right = states(machines.out / "session.mcap", Mentoring.RIGHT)
+            Mentoring.judge(self, right)
+            self.assertGreater(max(state[1] for state in right), 1.0)
+            self.assertEqual(right[-1][1], 0.0)
+            self.assertGreater(math.dist(right[0][2], right[-1][2]), 0.01, "the hand has not been led")
+
 
 if __name__ == "__main__":
     unittest.main()
