@@ -104,7 +104,8 @@ bool Safety::evaluateStops(const SafetyRequest& request, const DeviceState& stat
 
   // speed limit with hysteresis; NaN brakes
   const double speed = state.V_DH.linear.norm();
-  braking_ = !(speed <= (braking_ ? kBrakeReleaseFraction : 1.0) * limits_.max_speed);
+  braking_ = !(speed <= (braking_ ? kBrakeReleaseFraction : 1.0) * limits_.max_speed) ||
+             !state.V_DH.angular.allFinite();
   setFlag(SafetyRule::kOverspeed, braking_);
   return stopped_ || !request.armed || open || braking_;
 }
@@ -140,13 +141,14 @@ Wrench Safety::prepareRequest(const SafetyRequest& request) noexcept {
 }
 
 void Safety::restart() noexcept {
-  if (!slewed_.force.isZero(0.0) || !slewed_.torque.isZero(0.0)) {
-    leaving_ = slewed_ + leaving_ * leaving_share_;
+  const Wrench rendered = slewed_ + injected_;
+  if (!rendered.force.isZero(0.0) || !rendered.torque.isZero(0.0)) {
+    leaving_ = rendered + leaving_ * leaving_share_;
     leaving_share_ = 1.0;
   }
   force_starting_ = torque_starting_ = true;
   since_start_ = 0.0;
-  slewed_ = {};
+  slewed_ = injected_ = {};
   passivity_.forgive();
 }
 
@@ -177,7 +179,7 @@ Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping
   keepSettled();
   const double start = softStartFactor(since_start_, limits_);
   const double growth = std::min(dt, kLongestGrowth);
-  // the damping of what starts grows with it
+  // while a force starts, its damping is within the limits of the start
   const Wrench growing{force_starting_ ? damping.force : Vector3::Zero(),
                        torque_starting_ ? damping.torque : Vector3::Zero()};
   const Wrench ramped = clampedInRamp(wrench * start + growing);
@@ -189,13 +191,20 @@ Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping
              slewLimited(slewed_.torque, ramped.torque, torque_slew * growth)};
   const bool force_behind = slewed_.force != ramped.force;
   const bool torque_behind = slewed_.torque != ramped.torque;
-  force_starting_ = force_starting_ && (start < 1.0 || force_behind);
-  torque_starting_ = torque_starting_ && (start < 1.0 || torque_behind);
+  const bool force_starts = force_starting_ && (start < 1.0 || force_behind);
+  const bool torque_starts = torque_starting_ && (start < 1.0 || torque_behind);
+  // the damping of one that has started is added to it from now on
+  const Wrench started{force_starts ? Vector3::Zero() : growing.force,
+                       torque_starts ? Vector3::Zero() : growing.torque};
+  slewed_ = slewed_ + -started;
+  force_starting_ = force_starts;
+  torque_starting_ = torque_starts;
   setFlag(SafetyRule::kSoftStart, starting());
   setFlag(SafetyRule::kSlewLimited,
           (force_behind && !force_starting_) || (torque_behind && !torque_starting_));
   leaving_share_ = std::max(0.0, leaving_share_ - dt / kLeavingTime);
-  return slewed_ + leaving_ * leaving_share_ + damping + -growing;
+  injected_ = damping + -growing + started;
+  return slewed_ + leaving_ * leaving_share_ + injected_;
 }
 
 Wrench Safety::injectDamping(const DeviceState& state, double dt) noexcept {

@@ -120,7 +120,7 @@ class Safety {
   /// What was displayed, so not what hot motors took away, of a force or torque that is not late and does not
   /// start.
   void keepSettled() noexcept;
-  /// The scene's share of what may be displayed in it.
+  /// `wrench`, limited to what the scene may display in that second beside the wall.
   [[nodiscard]] Wrench clampedInRamp(const Wrench& wrench) const noexcept;
   /// `wall_growth` [N] in this step, which together with the scene's is limited; `dt` [s].
   [[nodiscard]] Wrench applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double wall_growth,
@@ -134,7 +134,7 @@ class Safety {
   /// [N] what of `wall` may act beside a scene that leaves it `stiffness_left` [N/m]; `growth` [s].
   [[nodiscard]] Vector3 limitedBesideScene(const Vector3& wall, double stiffness_left, const Vector3& p_DH,
                                            double growth) noexcept;
-  /// [N] the scene's, without injected damping, as it was displayed last.
+  /// [N] the scene's, as it was displayed last: with injected damping while it starts, else without.
   [[nodiscard]] Vector3 sceneForce() const noexcept {
     return slewed_.force + leaving_.force * leaving_share_;
   }
@@ -164,6 +164,7 @@ class Safety {
   Wrench slewed_;                   ///< last output of the slew limit
   double settled_force_ = 0.0;      ///< [N] last one before it was late or started
   double settled_torque_ = 0.0;     ///< [Nm] likewise
+  Wrench injected_;                 ///< damping in the last output, of what did not start
   Wrench leaving_;                  ///< that was displayed when the force restarted
   double leaving_share_ = 0.0;      ///< [-] of it that is left
   Vector3 wall_ = Vector3::Zero();  ///< [N] last output of the workspace wall

@@ -166,6 +166,7 @@ double MotorThermalModel::forceLimit(const SafetyLimits& limits) const noexcept 
 void PassivityObserver::observe(const Wrench& output, const Displacement& motion, double dt,
                                 const SafetyLimits& limits) noexcept {
   const double delivered = output.force.dot(motion.translation) + output.torque.dot(motion.rotation);
+  if (!std::isfinite(delivered)) return;
   // the active power reduces a deficit and never adds to the stored energy
   if (energy_ - delivered < 0.0)
     energy_ = std::min(0.0, energy_ - delivered + limits.active_power * dt);

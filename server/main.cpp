@@ -323,11 +323,15 @@ int serve(ServeArguments& arguments, const tenon::session::LoadedScene& loaded) 
   if (!server) return reportError(server.error().what);
   const auto report = (*server)->run(stop_requested);
   if (!report) return reportError(report.error().what);
-  describeSession(*report, say);
+  if (report->replaced_by.empty())
+    describeSession(*report, say);
+  else
+    reportError(report->replaced_by);
   if (report->left_journal) {
     printer.reset();  // prints what waits
     std::_Exit(1);    // destroys nothing: a thread waits for the disk
   }
+  if (!report->replaced_by.empty()) return 1;
   return tenon::isCompleted(report->run, arguments.allow_skips) ? 0 : 1;
 }
 

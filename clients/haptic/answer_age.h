@@ -44,7 +44,7 @@ class AnswerAge {
   static constexpr std::size_t kRing = 4096;
   static constexpr double kWindow =
       2.0;  ///< [s] each of two, with answers, in which the delay of the link is the smallest age
-  static constexpr double kTooLong = 2.0 * kLongestDelay + 0.02;  ///< [s] and back; 20 ms are the machines'
+  static constexpr double kTooLong = 2.0 * kLongestDelay + 0.02;  ///< [s] round trip, 20 ms of it at the ends
   static constexpr double kShortAgain = kTooLong - 0.01;          ///< [s] likewise
   static constexpr double kSure = 1.0;  ///< [s] a late answer after an interruption is no delay of the link
   static constexpr double kLongestPause = 0.1;  ///< [s] between two answers that count towards it

@@ -16,7 +16,10 @@ void Bracelet::receive(const HandManifold& manifold) noexcept {
   if (manifold.hand == contacts_.hand && manifold.tick >= contacts_.tick) contacts_ = manifold;
 }
 
-void Bracelet::permit(bool permitted) noexcept { GuardedDevice::permit(permitted, state_.forces_on); }
+void Bracelet::permit(bool permitted) noexcept {
+  stopped_ = !permitted;
+  GuardedDevice::permit(permitted, state_.forces_on);
+}
 
 void Bracelet::step(std::uint32_t seq, double dt) noexcept {
   answers_.step(seq, contacts_.answers_seq, dt);
@@ -26,7 +29,8 @@ void Bracelet::step(std::uint32_t seq, double dt) noexcept {
   request.requested.tactors = map_.step(contacts_, dt);
   request.age = answers_.excess();
   request.restart = finishing_;  // silent
-  request.emergency_stop = !permitted_;
+  request.armed = permitted_ || stopped_;
+  request.emergency_stop = stopped_;
   const devices::DeviceCommand command = safety_.step(request, state_, dt);
   write(command, finishing_);
   intensities_ = command.tactors;

@@ -37,6 +37,7 @@ class Bracelet : public GuardedDevice {
   AnswerAge answers_;
   devices::DeviceState state_;
   TactorIntensities intensities_{};
+  bool stopped_ = false;  ///< permit() took the permission
 };
 
 }  // namespace tenon::haptic

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tenon::haptic {
 
@@ -33,13 +34,17 @@ double DurationHistogram::quantile(double fraction) const noexcept {
   return count_ > 0 ? max() : 0.0;
 }
 
-void ReplacedAnswers::received(HandId hand, Tick tick, std::int64_t now_ns) noexcept {
+void ReplacedAnswers::received(HandId hand, std::uint32_t epoch, Tick tick, std::int64_t now_ns) noexcept {
   auto found =
       std::find_if(hands_.begin(), hands_.end(), [&](const Answers& one) { return one.hand == hand; });
   if (found == hands_.end()) {
     if (hands_.full()) return;
-    hands_.push_back({.hand = hand, .newest = tick, .cycle = now_ns, .received = 1});
+    hands_.push_back({.hand = hand, .epoch = epoch, .newest = tick, .cycle = now_ns, .received = 1});
     return;
+  }
+  if (epoch != found->epoch) {
+    found->epoch = epoch;
+    found->newest = 0;
   }
   if (tick == found->newest) return;  // repeated
   ++found->received;
@@ -64,9 +69,14 @@ void ForceAgeStatistics::inputSent(std::uint32_t seq, std::int64_t now_ns, std::
   last_sent_ = now_ns;
 }
 
-void ForceAgeStatistics::answerReceived(HandId hand, Tick tick, std::uint32_t seq,
-                                        std::int64_t now_ns) noexcept {
-  replaced_.received(hand, tick, now_ns);
+void ForceAgeStatistics::answerReceived(const HandManifold& manifold, std::int64_t now_ns) noexcept {
+  replaced_.received(manifold.hand, manifold.server_epoch, manifold.tick, now_ns);
+  const std::uint32_t seq = manifold.answers_seq;
+  if (std::exchange(server_epoch_, manifold.server_epoch) != manifold.server_epoch) {
+    // another life of the server numbers ticks, and so inputs, anew
+    newest_answer_ = 0;
+    answered_at_.reset();
+  }
   // the manifolds of all hands answer the same input: only the first counts
   if (seq == 0 || seq <= newest_answer_) return;
   const Sent& sent = sent_[seq % kRing];

@@ -7,6 +7,7 @@
 
 #include "idl/types/fixed_vector.h"
 #include "idl/types/ids.h"
+#include "idl/types/messages/contacts.h"
 #include "idl/types/messages/timing.h"
 
 namespace tenon::haptic {
@@ -46,14 +47,16 @@ class DurationHistogram {
 /// Threads: one. Real-time: everything.
 class ReplacedAnswers {
  public:
-  /// The answer of a tick, in the cycle that began at `now_ns`.
-  void received(HandId hand, Tick tick, std::int64_t now_ns) noexcept;
+  /// The answer of a tick of the server's life `epoch`, in the cycle that began at `now_ns`. Another life
+  /// begins anew.
+  void received(HandId hand, std::uint32_t epoch, Tick tick, std::int64_t now_ns) noexcept;
   /// [-] since the last call, of the hand with the largest; 0 without answers.
   [[nodiscard]] double take() noexcept;
 
  private:
   struct Answers {
     HandId hand;
+    std::uint32_t epoch = 0;
     Tick newest = 0;
     std::int64_t cycle = 0;  ///< [ns] of the newest
     std::uint32_t received = 0, replaced = 0;
@@ -70,9 +73,8 @@ class ForceAgeStatistics {
  public:
   /// Input `seq` was read at `now_ns`; `period_ns` is the nominal period of the loop.
   void inputSent(std::uint32_t seq, std::int64_t now_ns, std::int64_t period_ns) noexcept;
-  /// The manifold of a tick for a hand, which answers input `seq`, arrived. Repeated, overtaken and unknown
-  /// answers have no age.
-  void answerReceived(HandId hand, Tick tick, std::uint32_t seq, std::int64_t now_ns) noexcept;
+  /// A manifold arrived. An answer that is repeated, overtaken or to an unknown input has no age.
+  void answerReceived(const HandManifold& manifold, std::int64_t now_ns) noexcept;
   /// Sets the fields of `telemetry` that are measured here, and begins a new period of those that it states
   /// of the time since the last one.
   void fill(Telemetry& telemetry) noexcept;
@@ -88,6 +90,7 @@ class ForceAgeStatistics {
   DurationHistogram recent_ages_;  // since the last fill()
   DurationHistogram lateness_;
   ReplacedAnswers replaced_;  // since the last fill()
+  std::uint32_t server_epoch_ = 0;
   std::uint32_t newest_answer_ = 0;
   std::optional<std::int64_t> answered_at_;  // [ns] of newest_answer_
   std::int64_t longest_gap_ = 0;             // [ns] between two answers

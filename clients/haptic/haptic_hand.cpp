@@ -14,6 +14,8 @@ constexpr double kDampingFraction = 0.2;  // [-]
 constexpr double kShortestCycle = 1e-6;  // [s]
 // A longer one, as of a machine that stood still, counts as this for the age of a device's reading.
 constexpr double kLongestCycle = 0.01;  // [s]
+// The velocity of a last reading counts less and less within this, once the reading is as old as a gap.
+constexpr double kVelocityFades = 0.02;  // [s]
 // Gap at which the server reports contact, rounding included.
 constexpr float kContactGap = 5e-5F;  // [m]
 
@@ -147,8 +149,12 @@ bool HapticHand::rendersCopy() const noexcept {
 
 void HapticHand::checkReading(std::uint64_t seq_before, double dt) noexcept {
   const bool is_new = device_state_.seq != seq_before;
+  if (is_new) V_DH_read_ = device_state_.V_DH;
   reading_age_ = is_new ? 0.0 : reading_age_ + std::min(dt, kLongestCycle);
-  if (reading_age_ > safety_.limits().fade_from) device_state_.V_DH = {};
+  // gradually, since the layer may damp by it
+  const double late = reading_age_ - safety_.limits().fade_from;
+  const double share = std::clamp(1.0 - late / kVelocityFades, 0.0, 1.0);
+  device_state_.V_DH = {share * V_DH_read_.linear, share * V_DH_read_.angular};
   readings_lost_ = readings_lost_ || reading_age_ > safety_.limits().stale_at;
   if (!readings_lost_) return;
   device_state_.forces_on = false;
@@ -191,7 +197,7 @@ void HapticHand::anchor(std::uint32_t seq, const WorldView& world) noexcept {
   if (answers_.isTooLong()) {
     const bool permitted = reading_age_ <= safety_.limits().fade_from && permitted_ && safety_.forcesOn() &&
                            local_.usable(world);
-    // what contacts exert leaves by an interruption
+    // one interrupted cycle first: by that the contact force leaves within 20 ms
     const bool is_out = rendering_ == Rendering::kInterrupted || rendering_ == Rendering::kGuidanceAlone;
     rendering_ = permitted && is_out ? Rendering::kGuidanceAlone : Rendering::kInterrupted;
     return;

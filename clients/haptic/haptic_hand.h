@@ -183,6 +183,7 @@ class HapticHand : public GuardedDevice {
   std::uint32_t anchored_seq_ = 0;  // first input of the re-anchored hand
   devices::DeviceState device_state_;
   double reading_age_ = 0.0;    ///< [s] since there was a new one
+  Twist V_DH_read_;             ///< of the newest one
   bool readings_lost_ = false;  ///< latched, until the person presses
   DeviceInput input_;
   HandState state_;

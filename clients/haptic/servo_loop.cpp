@@ -35,8 +35,7 @@ void ServoLoop::receiveAll(std::int64_t now) noexcept {
   for (; frames_.front() != nullptr; frames_.pop()) station_.receive(*frames_.front());
   for (; manifolds_.front() != nullptr; manifolds_.pop()) {
     const HandManifold& manifold = *manifolds_.front();
-    if (station_.receive(manifold))
-      force_age_.answerReceived(manifold.hand, manifold.tick, manifold.answers_seq, now);
+    if (station_.receive(manifold)) force_age_.answerReceived(manifold, now);
   }
   for (; guidances_.front() != nullptr; guidances_.pop()) station_.receive(*guidances_.front());
   for (; steps_.front() != nullptr; steps_.pop()) station_.receive(*steps_.front());

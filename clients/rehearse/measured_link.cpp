@@ -7,7 +7,7 @@ namespace tenon::rehearse {
 void MeasuredLink::deliver(Tick now, haptic::Station& station) {
   link_.deliver(now, station, [&](const HandManifold& manifold) {
     loss_.received(manifold.hand, manifold.sent, nanoseconds(now));
-    ages_.answerReceived(manifold.hand, manifold.tick, manifold.answers_seq, nanoseconds(now));
+    ages_.answerReceived(manifold, nanoseconds(now));
   });
   link_.deliverAnswers(now, [&](const ClockSync& answer) { clock_.receive(answer, nanoseconds(now)); });
   if (now % kPeriod != 0) return;

@@ -46,7 +46,7 @@ class SampleCoverage {
 
   std::map<Tick, Period> periods_;
   std::map<std::string, std::map<Tick, std::uint64_t>, std::less<>> recorded_;  ///< by topic and period
-  std::map<HandId, Tick> newest_manifold_;                                      ///< [tenths of ticks]
+  std::map<HandId, Tick> newest_manifold_;                                      ///< [10 ticks]
   Tick first_ = 0;                                                              ///< of all samples; 0: none
 };
 

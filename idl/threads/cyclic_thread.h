@@ -34,8 +34,8 @@ struct CyclicOptions {
 /// One that is late is waited for kPatience periods more; from then on the clock paces, until there is one
 /// again.
 ///
-/// Scheduling that the operating system
-/// does not grant (real-time priority, CPU) is reported by notGranted(), and the thread runs without it.
+/// Scheduling that the operating system does not grant (real-time priority, CPU) is reported by notGranted(),
+/// and the thread runs without it.
 ///
 /// Threads: start, stop and the destructor from one thread; counters from any.
 /// Real-time: the loop, as far as the function is; it must not throw.

@@ -127,7 +127,7 @@ void ServerWire::logDelay(const std::string& person, const Telemetry& telemetry)
           ? fmt::format("{}: contacts are not felt over this link: {:.0f} ms one way, {:.0f} ms at most; "
                         "guidance continues",
                         person, 1e3 * delay, 1e3 * kLongestContactDelay)
-          : fmt::format("{}: contacts are felt again: {:.0f} ms one way", person, 1e3 * delay));
+          : fmt::format("{}: contacts are felt again", person));
 }
 
 void ServerWire::passFreezeLimit(HandId hand) {

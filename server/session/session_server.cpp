@@ -273,12 +273,15 @@ void Server::runLockstep(const std::atomic<bool>& stop) {
 /// Until the tick is in the journal's file; false: it was ended before. Meanwhile messages are handled.
 bool Server::awaitJournal(const std::atomic<bool>& stop) {
   std::optional until_told = std::chrono::steady_clock::now() + kJournalPatience;
+  std::optional<std::chrono::steady_clock::time_point> until_ended;  // a disk that is slow gets that long
   while (!journal_->isWrittenWithin(milliseconds(20))) {
-    if (stop || wire_->replaced()) return false;
-    if (until_told && std::chrono::steady_clock::now() >= *until_told) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!until_ended && (stop || registry_.stopRequested())) until_ended = now + kJournalPatience;
+    if (wire_->replaced() || (until_ended && now >= *until_ended)) return false;
+    if (until_told && now >= *until_told) {
       until_told.reset();
       wire_->log(Severity::kError, "journal",
-                 "the session waits for the journal's disk; Ctrl-C ends it without the rest of the journal");
+                 "the session waits for the journal's disk; Ctrl-C ends the session, a second one the wait");
     }
     wire_->dispatch(milliseconds(0));
   }
@@ -412,7 +415,7 @@ void Server::endJournal(SessionReport& report) {
     const std::uint32_t before = signals();
     print("waiting for the journal's disk; Ctrl-C ends the server without the rest of the journal");
     while (!report.left_journal && !journal_->isEndedWithin(milliseconds(20)))
-      report.left_journal = signals() != before;
+      report.left_journal = signals() != before || wire_->replaced();
   }
   if (report.left_journal) {
     journal_->leaveFile();
@@ -453,7 +456,8 @@ Result<SessionReport> Server::finish() {
   report.failed_writes = wire_->writes().failed;
   report.longest_write = wire_->writes().longest_seconds;
   if (journal_) endJournal(report);
-  if (wire_->replaced()) return fail(*wire_->replaced());
+  report.replaced_by = wire_->replaced().value_or("");
+  if (wire_->replaced()) return report;
 
   wire_->statePublished();
   // let reliable samples arrive before the writers are deleted: a client that has not received the end of the

@@ -60,6 +60,7 @@ struct SessionReport {
   /// The disk hangs with the rest of the journal and is not awaited: the process ends without destroying the
   /// server, whose destructor would wait.
   bool left_journal = false;
+  std::string replaced_by;  ///< why it had to end: another server has taken its place; or empty
 };
 
 /// The server of one training session: announces it over DDS, accepts clients, runs ticks in real time or in

@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -176,19 +178,95 @@ TEST(Safety, InjectsNoDampingIntoALosslessSpring) {
 
 // as of an instructor's hand that leads: the force acts along the motion, whose measured velocity is noisy
 TEST(Safety, TheDampingOfAHandThatIsLedDoesNotChatter) {
+  const double power = safetyLimits(kSigma).active_power;  // [W]
+  // the balance stays about zero with the second one
+  for (const double force : {3.0, 10.0 * power + 0.1}) {
+    Safety safety = settled(kSigma, {force, 0.0, 0.0});
+    DeviceState state = armed();
+    state.X_DH.translation().x() = -0.03;
+    double last = force, delivered = 0.0;
+    for (int tick = 0; tick < 600; ++tick) {
+      state.V_DH.linear.x() = tick % 2 == 0 ? 0.11 : 0.09;  // [m/s]
+      state.X_DH.translation().x() += kTick * 0.1;
+      const double output = safety.step(requestForce({force, 0.0, 0.0}), state, kTick).F_Ho_D.force.x();
+      EXPECT_LE(std::abs(output - last), kSigma.injected_damping * 0.02) << "the noise alone, at " << tick;
+      last = output;
+      if (tick >= 400) delivered += 0.1 * output * kTick;
+    }
+    EXPECT_LE(delivered, 0.2 * (power + 0.05)) << force;
+    EXPECT_TRUE(safety.acts(SafetyRule::kPassivity)) << force;
+  }
+}
+
+// A mass in a spring that is ten times too stiff for its delay of 2 ms: without damping its oscillation grows
+// e-fold each 150 ms.
+TEST(Safety, AnUnstableLoopIsDampedToABoundedOscillation) {
+  constexpr double kStiffness = 1000.0, kMass = 0.3, kPush = 0.1;  // [N/m], [kg], [m/s]
+  Safety safety = settled(kSigma, Vector3::Zero());
+  DeviceState state = armed();
+  double x = 0.0, v = kPush, largest = 0.0, grown = 0.0;
+  std::array<double, 2> earlier{};
+  for (int tick = 0; tick < 3000; ++tick) {
+    state.X_DH.translation().x() = x;
+    state.V_DH.linear.x() = v;
+    const double asked = -kStiffness * std::exchange(earlier[tick % 2], x);
+    const double force = safety.step(requestForce({asked, 0.0, 0.0}), state, kTick).F_Ho_D.force.x();
+    v += kTick * force / kMass;
+    x += kTick * v;
+    (tick < 1500 ? largest : grown) = std::max(tick < 1500 ? largest : grown, std::abs(x));
+  }
+  EXPECT_LT(largest, 0.01);
+  EXPECT_LT(grown, 1.05 * largest);
+}
+
+TEST(Safety, AVelocityThatIsNoNumberBrakesAndIsForgotten) {
   Safety safety = settled(kSigma, {3.0, 0.0, 0.0});
   DeviceState state = armed();
-  double last = 3.0, damping = 0.0;
-  for (int tick = 0; tick < 600; ++tick) {
-    state.V_DH.linear.x() = tick % 2 == 0 ? 0.11 : 0.09;  // [m/s]
-    state.X_DH.translation().x() += kTick * 0.1;
+  state.V_DH.angular.z() = kNan;
+  const DeviceCommand output = safety.step(requestForce({3.0, 0.0, 0.0}), state, kTick);
+  EXPECT_TRUE(output.brake);
+  EXPECT_TRUE(isFinite(output.F_Ho_D));
+  state.V_DH.angular.z() = 0.0;
+  for (int tick = 0; tick < 2000; ++tick) (void)safety.step(requestForce({3.0, 0.0, 0.0}), state, kTick);
+  EXPECT_TRUE(std::isfinite(safety.energy()));
+  EXPECT_EQ(safety.step(requestForce({3.0, 0.0, 0.0}), state, kTick).F_Ho_D.force.x(), 3.0);
+}
+
+// led on while its force starts: at the end of the start the damping is counted once
+TEST(Safety, AtTheEndOfASoftStartTheDampingHasNoStep) {
+  Safety safety(kSigma);
+  DeviceState state = armed();
+  state.X_DH.translation().x() = -0.03;
+  double last = 0.0;
+  for (int tick = 0; tick < 1200; ++tick) {
+    state.V_DH.linear.x() = std::clamp(0.001 * (tick - 600), 0.0, 0.1);  // [m/s]
+    state.X_DH.translation() += kTick * state.V_DH.linear;
     const double force = safety.step(requestForce({3.0, 0.0, 0.0}), state, kTick).F_Ho_D.force.x();
-    EXPECT_LE(std::abs(force - last), kSigma.injected_damping * 0.02) << "the noise alone, at " << tick;
+    EXPECT_LE(std::abs(force - last), safetyLimits(kSigma).start_force_slew * kTick + 2e-3) << tick;
     last = force;
-    damping = 3.0 - force;
   }
-  EXPECT_GT(damping, 0.5);
-  EXPECT_LE(last * 0.1, safetyLimits(kSigma).active_power + 0.05) << "what it delivers";
+  EXPECT_FALSE(safety.acts(SafetyRule::kSoftStart));
+  EXPECT_TRUE(safety.acts(SafetyRule::kPassivity));
+}
+
+TEST(Safety, TheForceOfAHandThatIsLedLeavesWithItsDamping) {
+  Safety safety = settled(kSigma, {3.0, 0.0, 0.0});
+  DeviceState state = armed();
+  state.X_DH.translation().x() = -0.03;
+  state.V_DH.linear.x() = 0.1;  // [m/s]
+  double last = 3.0;
+  for (int tick = 0; tick < 630; ++tick) {
+    state.X_DH.translation().x() += kTick * 0.1;
+    SafetyRequest request = requestForce({3.0, 0.0, 0.0});
+    request.restart = tick >= 600;
+    const double force = safety.step(request, state, kTick).F_Ho_D.force.x();
+    EXPECT_LE(std::abs(force - last), 3.0 / 20.0 + 1e-9) << "within 20 ms, at " << tick;
+    if (tick == 599) {
+      EXPECT_LT(force, 2.5) << "damped";
+    }
+    last = force;
+  }
+  EXPECT_EQ(last, 0.0);
 }
 
 TEST(Safety, BrakesAboveTheSpeedLimitWithHysteresis) {

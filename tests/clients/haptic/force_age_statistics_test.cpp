@@ -36,20 +36,27 @@ TEST(DurationHistogram, LongDurationsAreExactToTwoPercent) {
   EXPECT_EQ(durations.count(), 0U);
 }
 
+HandManifold answer(HandId hand, Tick tick, std::uint32_t seq, std::uint32_t epoch = 1) {
+  return {.hand = hand, .server_epoch = epoch, .tick = tick, .answers_seq = seq};
+}
+
 //  cycle      1     2       3     answers 2 and 3 come in one cycle, 4 after 5
 //  answers    1     2 3     5 4
 TEST(ReplacedAnswers, AreThoseThatANewerOneReplacedBeforeACycleUsedThem) {
   ReplacedAnswers replaced;
   EXPECT_EQ(replaced.take(), 0.0);
-  replaced.received(HandId{0}, 1, 1);
-  replaced.received(HandId{0}, 2, 2);
-  replaced.received(HandId{0}, 3, 2);
-  replaced.received(HandId{0}, 5, 3);
-  replaced.received(HandId{0}, 4, 3);
-  replaced.received(HandId{0}, 5, 3);  // again
-  replaced.received(HandId{1}, 1, 3);
+  replaced.received(HandId{0}, 1, 1, 1);
+  replaced.received(HandId{0}, 1, 2, 2);
+  replaced.received(HandId{0}, 1, 3, 2);
+  replaced.received(HandId{0}, 1, 5, 3);
+  replaced.received(HandId{0}, 1, 4, 3);
+  replaced.received(HandId{0}, 1, 5, 3);  // again
+  replaced.received(HandId{1}, 1, 1, 3);
   EXPECT_DOUBLE_EQ(replaced.take(), 2.0 / 5.0);
   EXPECT_EQ(replaced.take(), 0.0);
+  for (Tick tick = 1; tick <= 3; ++tick)
+    replaced.received(HandId{0}, 2, tick, 10 + static_cast<std::int64_t>(tick));
+  EXPECT_EQ(replaced.take(), 0.0) << "ticks of another life of the server are no earlier ones";
 }
 
 //  input     1   2   3            each answered after 2 ms; the second answer to 2 is from the other hand
@@ -59,12 +66,12 @@ TEST(ForceAgeStatistics, CountsTheTimeFromAnInputToItsFirstAnswerOnce) {
   for (std::uint32_t seq = 1; seq <= 10; ++seq)
     age.inputSent(seq, seq * kMillisecondOfAge, kMillisecondOfAge);
   for (std::uint32_t seq = 1; seq <= 10; ++seq) {
-    age.answerReceived(HandId{0}, seq, seq, (seq + 2) * kMillisecondOfAge);
-    age.answerReceived(HandId{1}, seq, seq, (seq + 7) * kMillisecondOfAge);
+    age.answerReceived(answer(HandId{0}, seq, seq), (seq + 2) * kMillisecondOfAge);
+    age.answerReceived(answer(HandId{1}, seq, seq), (seq + 7) * kMillisecondOfAge);
   }
-  age.answerReceived(HandId{0}, 1, 2, 100 * kMillisecondOfAge);
-  age.answerReceived(HandId{0}, 1, 0, 100 * kMillisecondOfAge);
-  age.answerReceived(HandId{0}, 1, 4711, 100 * kMillisecondOfAge);
+  age.answerReceived(answer(HandId{0}, 1, 2), 100 * kMillisecondOfAge);
+  age.answerReceived(answer(HandId{0}, 1, 0), 100 * kMillisecondOfAge);
+  age.answerReceived(answer(HandId{0}, 1, 4711), 100 * kMillisecondOfAge);
   Telemetry telemetry;
   age.fill(telemetry);
   EXPECT_EQ(telemetry.samples, 10U);
@@ -83,10 +90,22 @@ TEST(ForceAgeStatistics, KeepsTheLongestTimeWithoutANewerAnswer) {
   ForceAgeStatistics age;
   for (std::uint32_t seq = 1; seq <= 5; ++seq) age.inputSent(seq, seq * kMillisecondOfAge, kMillisecondOfAge);
   for (const std::uint32_t seq : {1, 2, 4, 3, 5})
-    age.answerReceived(HandId{0}, seq, seq, std::max(seq, 2U) * kMillisecondOfAge);
+    age.answerReceived(answer(HandId{0}, seq, seq), std::max(seq, 2U) * kMillisecondOfAge);
   Telemetry telemetry;
   age.fill(telemetry);
   EXPECT_DOUBLE_EQ(telemetry.longest_silence, 2e-3);
+}
+
+TEST(ForceAgeStatistics, AServerThatBeganAnewNumbersInputsAnew) {
+  ForceAgeStatistics age;
+  age.inputSent(500, 500 * kMillisecondOfAge, kMillisecondOfAge);
+  age.answerReceived(answer(HandId{0}, 500, 500), 502 * kMillisecondOfAge);
+  age.inputSent(1, 900 * kMillisecondOfAge, kMillisecondOfAge);
+  age.answerReceived(answer(HandId{0}, 1, 1, 2), 903 * kMillisecondOfAge);
+  Telemetry telemetry;
+  age.fill(telemetry);
+  EXPECT_EQ(telemetry.samples, 2U);
+  EXPECT_EQ(telemetry.longest_silence, 0.0);
 }
 
 }  // namespace

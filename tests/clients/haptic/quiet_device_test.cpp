@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <utility>
 
@@ -64,7 +65,7 @@ TEST(DeviceWithoutReadings, ItsForceFadesAsThatOfOldContactsAndItsHandStandsStil
     if (i == 60) {
       EXPECT_LT(last, 0.6 * before);
     }
-    if (i > 21) {
+    if (i > 41) {
       EXPECT_EQ(rig.setup.hand.input().sample.V_WH.linear.norm(), 0.0) << "no speed is known";
     }
   }
@@ -73,6 +74,39 @@ TEST(DeviceWithoutReadings, ItsForceFadesAsThatOfOldContactsAndItsHandStandsStil
   EXPECT_TRUE(fault_began);
   EXPECT_FALSE(rig.setup.hand.input().active);
   EXPECT_LT((rig.setup.hand.pose().translation() - held.translation()).norm(), 1e-4);
+}
+
+TEST(DeviceWithoutReadings, TheDampingOfAHandThatIsLedLeavesGradually) {
+  test::QuietDevice* device = nullptr;
+  auto quiet = std::make_unique<test::QuietDevice>(std::move(*devices::openDevice("falcon-sim")));
+  device = quiet.get();
+  HandAboveFloor setup(std::move(quiet));
+  Guidance message;
+  message.hand = test::kHand;
+  message.choice = 1;
+  message.stiffness = 200.0;
+  message.mode = GuidanceMode::kLead;
+  const auto yield = [&] {
+    ++message.tick;
+    setup.hand.receive(message);
+    setup.step(setup.hand.pose().translation());
+  };
+  for (int i = 0; i < 1500; ++i) yield();
+  message.X_WF = Pose(setup.hand.pose().translation() + Vector3(0.03, 0.02, 0.03));
+  const auto isDamped = [&] {
+    return (setup.hand.state().safety_flags & bit(devices::SafetyRule::kPassivity)) != 0 &&
+           setup.hand.state().guidance_force - setup.force() > 0.3;
+  };
+  for (int i = 0; i < 2000 && !isDamped(); ++i) yield();
+  ASSERT_TRUE(isDamped());
+  device->quiet = true;
+  double last = setup.force();
+  for (int i = 1; i <= 110; ++i) {
+    yield();
+    EXPECT_LE(std::abs(setup.force() - last), 0.12) << i << " ms";
+    last = setup.force();
+  }
+  EXPECT_EQ(last, 0.0);
 }
 
 TEST(DeviceWithoutReadings, AfterAFaultItsForceComesBackByThePersonsPressAloneAndSoftly) {

@@ -10,7 +10,7 @@ const LONGEST_RETRY = 8; // s
 /** Reasons of the gateway after which it is asked again seldom: pages would put each other out all the time, and a session that is not there may begin. */
 const SELDOM = [/^a newer viewer came/, /^there is no such session/];
 const HANGS = 2500; // [ms] without a message: a gateway sends one every 2 s at least
-const LOOK = 1000; // [ms] between looks at what was heard
+const PERIOD = 1000; // [ms] of updates of what was heard
 /** Looks without a message, counted so that a page that was busy or asleep hears first what has come meanwhile. */
 const GIVEN_UP = 10;
 
@@ -44,8 +44,8 @@ export class LiveSource {
   /** The gateway sends a heartbeat to its own pages; a connection without one may be silent for long. Until the first message all are watched. */
   private isWatched = true;
   private heardAt = 0; // [ms]
-  private quiet = 0; // looks
-  private watch = window.setInterval(() => this.look(), LOOK);
+  private quiet = 0; // periods
+  private watch = window.setInterval(() => this.check(), PERIOD);
 
   constructor(private url: string, private topics: readonly string[], private handler: Handler, private onState: (state: LiveState) => void) {
     onState({ kind: "connecting" });
@@ -115,7 +115,7 @@ export class LiveSource {
   }
 
   /** Gives a connection up of which nothing is heard: its loss may never be told. */
-  private look(): void {
+  private check(): void {
     const { socket } = this;
     if (socket === undefined || !this.isWatched || ++this.quiet < GIVEN_UP) return;
     socket.close();

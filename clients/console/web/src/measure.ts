@@ -10,7 +10,7 @@ import { n, t } from "./strings";
 
 const COLOR = 0xd55e00;
 const DOT = 4; // [pixels]
-const PERIOD = 200; // [ms] between two looks at parts that move
+const PERIOD = 200; // [ms] between two measurements of parts that move
 const SHARE = 0.1; // of the time that goes into them at most
 
 /** Of [m]; no minus before a 0. */

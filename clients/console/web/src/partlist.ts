@@ -5,7 +5,7 @@ import type { SceneView } from "./scene";
 import type { Session } from "./session";
 import { language, t } from "./strings";
 
-const PERIOD = 300; // [ms] between looks
+const PERIOD = 300; // [ms] between two updates
 const PAGE = 8; // rows
 
 /** `pick`: the cursor has come to an object; `use`: Enter on it; `close`: Escape. */
