@@ -96,7 +96,8 @@ void seedFromCoarse(Flood& flood, const BrickLevel& level, const BrickLevel& coa
 /// A vector to a neighbouring lattice point.
 struct LatticeOffset {
   int patch_offset;
-  float length;  // [voxels]
+  float length;          // [voxels]
+  Eigen::Vector3i step;  // [voxels]
 };
 
 /// The lattice points within kReach, nearest first.
@@ -107,7 +108,7 @@ std::vector<LatticeOffset> offsetsByLength() {
       for (int x = -kReach; x <= kReach; ++x) {
         const int squared = x * x + y * y + z * z;
         if (squared == 0 || squared > kReach * kReach) continue;
-        offsets.push_back({(z * kPatch + y) * kPatch + x, std::sqrt(static_cast<float>(squared))});
+        offsets.push_back({(z * kPatch + y) * kPatch + x, std::sqrt(static_cast<float>(squared)), {x, y, z}});
       }
     }
   }
@@ -141,9 +142,20 @@ bool looksSolid(const TriangleTree& tree, const Vector3& p) {
   return true;
 }
 
+/// Whether p is in front of all triangles that are nearest to it, at `distance` [m].
+bool isInFront(const TriangleTree& tree, const Vector3& p, double distance, double margin) {
+  bool any = false;
+  const bool behind = tree.visitWithin(p, distance + margin, [&](const structures::Triangle& triangle) {
+    any = true;
+    return (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).dot(p - triangle[0]) <= 0.0;
+  });
+  return any && !behind;
+}
+
 /// The samples of a brick that are outside: reached, in the empty ball around a reached one, or in a corner
-/// that no such ball fills: beside a reached one, with empty balls that overlap. Empty balls that overlap are
-/// on the same side of every surface, unless triangles are missing.
+/// that no such ball fills. There either its empty ball overlaps that of a reached one beside it (empty balls
+/// that overlap are on the same side of every surface, unless triangles are missing), or it is in front of
+/// the nearest surface and sees a reached one.
 BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* coarse, std::size_t node,
                                      const TriangleTree& tree, const std::vector<LatticeOffset>& offsets) {
   const std::int32_t slot = level.slot[node];
@@ -162,6 +174,8 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
   // [voxels] so that a sample exactly on the surface counts as outside in spite of rounding
   constexpr float kRounding = 0.002F;
   constexpr float kLeastRadius = 0.016F;  // [voxels] of a sample whose side rounding cannot change
+  constexpr float kCornerReach = 0.75F;   // [voxels] from the surface, of a sample in a corner
+  constexpr double kMargin = 0.01;        // [voxels] of a sample's rounding
   constexpr std::ptrdiff_t kBeside = 26;  // offsets to the samples of neighbouring cells
   for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
     const Cell in_brick = BrickLevel::cellOfSample(sample);
@@ -180,7 +194,15 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
             const float radius = patch[static_cast<std::size_t>(position + neighbour.patch_offset)];
             return radius > 0.0F && radius + own > neighbour.length + kRounding;
           });
-      is_outside = is_outside || (in_corner && !looksSolid(tree, level.position(corner + in_brick)));
+      const Vector3 p = level.position(corner + in_brick);
+      const bool sees_outside =
+          !is_outside && !in_corner && own > kLeastRadius && own < kCornerReach &&
+          isInFront(tree, p, own * level.voxel, kMargin * level.voxel) &&
+          std::any_of(offsets.begin(), offsets.end(), [&](const LatticeOffset& neighbour) {
+            return patch[static_cast<std::size_t>(position + neighbour.patch_offset)] > 0.0F &&
+                   tree.firstIntersection(p, level.voxel * neighbour.step.cast<double>()).triangle == nullptr;
+          });
+      is_outside = is_outside || ((in_corner || sees_outside) && !looksSolid(tree, p));
     }
     outside[static_cast<std::size_t>(sample)] = is_outside;
   }

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "server/bake/parallel.h"
 #include "server/bake/triangle_tree.h"
@@ -290,9 +291,13 @@ class ValleyFinder {
       const double offset = plane.offset * brick_.voxel - plane.n.dot(p_FoC);
       planes.push_back(shared({plane.n.cast<float>(), static_cast<float>(offset)}));
     }
-    std::sort(planes.begin(), planes.end(), [](const ValleyPlane& a, const ValleyPlane& b) {
+    const auto isBefore = [](const ValleyPlane& a, const ValleyPlane& b) {
       return std::lexicographical_compare(a.n_M.begin(), a.n_M.end(), b.n_M.begin(), b.n_M.end());
-    });
+    };
+    // by insertion: GCC 12 takes std::sort of so few to be out of their bounds
+    for (std::size_t i = 1; i < planes.size(); ++i)
+      for (std::size_t k = i; k > 0 && isBefore(planes[k], planes[k - 1]); --k)
+        std::swap(planes[k], planes[k - 1]);
     return planes;
   }
 
