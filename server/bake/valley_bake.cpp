@@ -35,9 +35,11 @@ constexpr int kNearQuanta = kValleyQuanta / 2;
 /// [voxels] The planes are the surface, and the field, to this.
 constexpr double kPlaneFit = 0.01;
 
-/// [voxels] Samples nearer to the surface may have the wrong sign in a corner, see findOutside(), or be too
-/// deep where the surface there counts as hidden.
+/// [voxels] Samples nearer to the surface may have the wrong sign in a corner, see findOutside().
 constexpr double kTrusted = 0.4;
+
+/// [voxels] Samples behind a concave edge may be too deep by this: pieces of the surface there count as hidden.
+constexpr double kTooDeep = 0.15;
 
 /// [voxels] Triangles are in a plane to this.
 constexpr double kInPlane = 0.004;
@@ -183,8 +185,11 @@ class CellSurface {
       const double there =
           distanceToPlanes(planes, pointInCell((k & 1U) * 2 + (k >> 1U & 1U) * 6 + (k >> 2U) * 18));
       if (std::abs(there) < kTrusted) continue;
-      if (!isDistanceToPlanes(planes, samples_[k], there)) return false;
-      is_trusted = true;
+      if (isDistanceToPlanes(planes, samples_[k], there)) {
+        is_trusted = true;
+      } else if (there > 0.0 || samples_[k] > there || samples_[k] < there - kTooDeep) {
+        return false;
+      }
     }
     if (!is_trusted) return false;
     for (std::size_t k = 0; k < kCellPoints; ++k) {
