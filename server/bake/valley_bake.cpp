@@ -47,6 +47,9 @@ constexpr double kInPlane = 0.004;
 /// [voxels] Smaller errors of the interpolation are left.
 constexpr double kLeastError = 0.004;
 
+/// [voxels] So far behind the planes the interpolation counts: the surface may pass between the points.
+constexpr double kBehind = 0.3;
+
 /// [-] Normals with a cosine nearer to 1 than this are of one plane.
 constexpr double kOnePlane = 1e-6;
 
@@ -210,7 +213,7 @@ class CellSurface {
                         ((corner & 4U) != 0 ? t.z() : 1.0 - t.z());
       }
       const double there = distanceToPlanes(planes, pointInCell(k));
-      if (there >= 0.0 && std::abs(there - interpolated) > kLeastError) return true;
+      if (there >= -kBehind && std::abs(there - interpolated) > kLeastError) return true;
     }
     return false;
   }
