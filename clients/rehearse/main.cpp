@@ -216,12 +216,12 @@ void setOptions(RehearseArguments& arguments) {
 }
 
 void printOutcome(const tenon::rehearse::RehearsalReport& report) {
-  std::printf("%s after %.3f s\nfinal state hash: %016llx\n", report.reason.c_str(),
-              static_cast<double>(report.ticks) * tenon::kTickSeconds,
-              static_cast<unsigned long long>(report.final_hash));
+  std::printf("%s after %.3f s\n", report.reason.c_str(),
+              static_cast<double>(report.ticks) * tenon::kTickSeconds);
   if (report.crowded_ticks > 0)
     std::printf("in %llu ticks a pair had more contacts than its list takes; the farthest were skipped\n",
                 static_cast<unsigned long long>(report.crowded_ticks));
+  std::printf("final state hash: %016llx\n", static_cast<unsigned long long>(report.final_hash));
 }
 
 /// Says what is wrong with the scenario, as `tenon check` does.
