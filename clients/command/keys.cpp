@@ -191,7 +191,8 @@ class KeyDesk {
     is_outside_ = true;
     why_outside_ = why;
     report(why);
-    show(std::string("the emergency stop alone can be raised from here, which needs no key: ") + kWhatIsLeft);
+    std::string left = "the emergency stop alone can be raised from here, which needs no key: ";
+    show(left += kWhatIsLeft);
   }
 
   void comeBack() {

@@ -38,7 +38,8 @@ constexpr double kPlaneFit = 0.01;
 /// [voxels] Samples nearer to the surface may have the wrong sign in a corner, see findOutside().
 constexpr double kTrusted = 0.4;
 
-/// [voxels] Samples behind a concave edge may be too deep by this: pieces of the surface there count as hidden.
+/// [voxels] Samples behind a concave edge may be too deep by this: pieces of the surface there count as
+/// hidden.
 constexpr double kTooDeep = 0.15;
 
 /// [voxels] Triangles are in a plane to this.
