@@ -52,7 +52,7 @@ class ScriptedClient {
     subscribe(session_, wire::kEmergencyStop, [this](const EmergencyStop& stop) { stops.raise(stop); });
     subscribe(session_, wire::kEmergencyClear,
               [this](const EmergencyClear& cleared) { stops.clear(cleared); });
-    subscribe(session_, wire::kNewestRaise, [this](const NewestRaise& newest) { newest_raise = newest; });
+    subscribe(session_, wire::kNewestRaise, [this](const NewestRaise& raise) { newest_raise = raise; });
     subscribe(everything_, wire::kHandManifold, [this](const HandManifold& manifold) {
       if (manifold.hand == controlledHand()) newest = manifold, ++manifolds;
     });
@@ -120,9 +120,9 @@ class ScriptedClient {
   }
   void command(CommandKind kind) { (void)commands_.write({welcome.client, ++commands_sent_, kind}); }
   /// As one who was told of raises up to this number; its id is counted with those of command().
-  void clearStop(std::uint32_t newest) {
+  void clearStop(std::uint32_t raise) {
     Command clear{welcome.client, ++commands_sent_, CommandKind::kClearEmergencyStop};
-    clear.value = newest;
+    clear.value = raise;
     (void)commands_.write(clear);
   }
 
