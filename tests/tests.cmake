@@ -86,7 +86,9 @@ tenon_tests(idl/threads THREADS LINK idl_threads)
 tenon_tests(server/simulation THREADS LINK server_simulation server_bake scenarios_part_generator)  # parts with edges
 tenon_tests(server/session THREADS LINK server_session clients_haptic)  # a session and its station
 tenon_tests(clients/haptic THREADS LINK clients_haptic server_simulation)  # two stations and their server in one process
-target_compile_options(clients_haptic_tests PRIVATE -Wno-error=free-nonheap-object)  # GCC 12 at -O3, of std::async's result
+if(BUILD_TESTING)
+  target_compile_options(clients_haptic_tests PRIVATE -Wno-error=free-nonheap-object)  # GCC 12 at -O3, of std::async's result
+endif()
 foreach(target server_bake_tests server_collision_tests server_session_tests)
   if(TARGET ${target})
     add_dependencies(${target} tenon-bake tenon-parts)  # started by them
