@@ -15,7 +15,7 @@ import { keep, kept, t, type Key } from "./strings";
 const NOTICE = 8000; // [ms] that an answer is shown
 const NOTICES = 3;
 const ROLE = "role"; // in this tab's memory, of a seat that is taken again
-const OTHER_LABELS: Record<string, Key> = { note: "desk.note.said", clear: "stop.clear", collision: "desk.collision", kick: "desk.kick", give: "desk.give", guide: "guide" };
+const OTHER_LABELS: Record<string, Key> = { note: "desk.note.said", clear: "stop.clear", collision: "desk.collision", kick: "desk.kick", goto: "desk.goto", give: "desk.give", guide: "guide" };
 
 export class Desk {
   readonly stop = h("button", "stop");

@@ -174,7 +174,7 @@ export function textOf(session: Session, event: Pick<EventLog, "kind" | "text">)
 
 /** Texts of the gateway and of the server, of a seat that is no more. */
 const LOSSES: [RegExp, Key][] = [
-  [/ was removed by (?<by>.+)$/, "lost.removed"],
+  [/ was removed by (?<by>[^;]+)/, "lost.removed"],
   [/ is gone$/, "lost.gone"],
   [/: has left$|has been silent for |join first$/, "lost.expired"],
   [/^nothing was heard of this page/, "lost.page"],
