@@ -8,7 +8,7 @@
 namespace tenon::session {
 namespace {
 
-// Below those of ticks and wire. Without one the file lacks ticks, which go on at high load. Its thread
+// Below those of ticks and wire. Without one the file lacks ticks, which continue at high load. Its thread
 // sleeps nearly always. Copies have the default scheduling: a recorder may wait.
 constexpr int kFilePriority = 40;
 // what a server that is killed loses at most

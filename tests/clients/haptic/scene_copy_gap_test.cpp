@@ -79,7 +79,7 @@ double heightAt(double t) {
   return 0.5 * test::kEdge + 0.01 - (0.01 + kPressed) * std::clamp(t - 0.5, 0.0, 1.0);
 }
 
-//   [block]->          the hand slides off the table's edge and goes on 8 mm below its top, all of it while
+//   [block]->          the hand slides off the table's edge and moves on, 8 mm below its top, all of it while
 //   [ table ] |        the server's last word, which lists the top, is on its way
 //             v
 TEST(ForceReturnOfCopy, AGapBesideAnEdgeBringsNoForceOfTheServersOldContacts) {

@@ -111,7 +111,7 @@ TEST_P(TorqueReturn, AfterAGapInWhichTheWristTurnedIsSoft) {
   }
   EXPECT_GT(torques.back(), 0.5 * device.most);
   for (int i = 0; i < 3000; ++i) setup.turn(kWristTurn);
-  EXPECT_GT(setup.torque(), 2.0 * device.most) << "who goes on to turn feels that the part does not";
+  EXPECT_GT(setup.torque(), 2.0 * device.most) << "who continues to turn feels that the part does not";
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, TorqueReturn,

@@ -455,7 +455,7 @@ const tests = {
     assert.equal(stopOf({ live: { kind: "reconnecting", reason: "" }, session: new Session(), age: 0, silence: 0, lobby: {} }).state, "unknown", "nor does the stop of all sessions go anywhere");
   },
 
-  "a server that goes on and says that no raise stands is believed, also where clears are not told any more"() {
+  "a server that continues and says that no raise stands is believed, also where clears are not told any more"() {
     const session = sessionOf();
     const raise = (counter) => session.receive("EmergencyStop", { client_guid: "a", counter, who: "Ada", reason: "" }, false);
     const newest = (standing) => session.receive("NewestRaise", { number: 3000, standing, who: "Bob", reason: "again" }, false);
