@@ -32,7 +32,8 @@ void SampleCoverage::addManifold(HandId hand, Tick tick) {
   Tick& newest = newest_manifold_.try_emplace(hand, tick / kManifoldPeriod + 1).first->second;
   if (newest == tick / kManifoldPeriod) return;
   newest = tick / kManifoldPeriod;
-  recorded_[std::string(wire::kHandManifold.name)][periodOf(tick)] += kManifoldPeriod;
+  // the last tick of a period of PublishedSamples is the first one of 10: they count in the next period
+  recorded_[std::string(wire::kHandManifold.name)][periodOf(newest * kManifoldPeriod + 1)] += kManifoldPeriod;
 }
 
 SampleCount SampleCoverage::between(std::string_view topic, Tick first, Tick last) const {

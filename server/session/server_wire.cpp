@@ -337,8 +337,9 @@ const HandManifold& ServerWire::numbered(const HandManifold& manifold, std::vect
 
 void ServerWire::resendLast() {
   if (last_ == nullptr) return;
-  for (const WorldFrame& frame : last_->frames) writers_->frame_1k.write(frame);
-  for (const HandManifold* manifold : last_->manifolds) writers_->manifold.write(numbered(*manifold, sent_));
+  // a repeated sample is no further one of its tick: PublishedSamples is the same on any machine
+  for (const WorldFrame& frame : last_->frames) writers_->frame_1k.send(frame);
+  for (const HandManifold* manifold : last_->manifolds) writers_->manifold.send(numbered(*manifold, sent_));
 }
 
 void ServerWire::send(const OutgoingMessages& outgoing) {
