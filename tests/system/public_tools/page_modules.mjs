@@ -70,6 +70,14 @@ class Select extends Element {
     this.children = children;
     this.chosen = children.length > 0 ? 0 : -1;
   }
+  addEventListener(name, act) {
+    if (name === "change") this.onChange = act;
+  }
+  /** As a person does. */
+  choose(value) {
+    this.value = value;
+    this.onChange();
+  }
 }
 
 /** A gateway of which the page's connections hear what a test says. */
@@ -536,7 +544,7 @@ const tests = {
     const options = (...names) => names.map((name) => ({ name, title: name.toUpperCase() }));
     setOptions(select, options("a", "b", "c"));
     assert.equal(select.value, "a");
-    select.value = "b";
+    select.choose("b");
     const [first] = select.children;
     setOptions(select, options("a", "b", "c"));
     assert.equal(select.children[0], first, "the same ones stay");
@@ -544,6 +552,15 @@ const tests = {
     assert.equal(select.value, "b");
     setOptions(select, options("a", "c"));
     assert.deepEqual([select.value, select.children.map(({ value }) => value)], ["", ["a", "c"]]);
+  },
+
+  "a list of which nobody has chosen shows its first entry, also when another one was the first before"() {
+    const select = new Select();
+    const options = (...names) => names.map((name) => ({ name, title: name }));
+    for (const [names, expected] of [[[], ""], [["fixed", "a"], "fixed"], [["a", "b"], "a"], [["b"], "b"], [["a", "b"], "a"]]) {
+      setOptions(select, options(...names));
+      assert.equal(select.value, expected);
+    }
   },
 
   "a card of the list of sessions stays where it is when another session begins, and says that its connection is lost"() {

@@ -45,14 +45,15 @@ export function forbid(button: HTMLElement, why: string): void {
   else button.setAttribute("aria-disabled", "true");
 }
 
-/** Gives a list these options. What was chosen stays; where it is no longer there, nothing is chosen: nobody chose the first one instead. */
+/** Gives a list these options. The first one is shown until a person chooses; where that choice is no longer there, nothing is: nobody chose the first one instead. */
 export function setOptions(select: HTMLSelectElement, options: { name: string; title: string }[]): void {
   const listed = JSON.stringify(options);
   if (select.dataset["listed"] === listed) return;
+  if (select.dataset["listed"] === undefined) select.addEventListener("change", () => (select.dataset["chosen"] = "yes"));
   select.dataset["listed"] = listed;
-  const before = select.options.length === 0 ? undefined : select.value;
+  const chosen = select.dataset["chosen"] === undefined ? undefined : select.value;
   select.replaceChildren(...options.map(({ name, title }) => Object.assign(h("option", "", title || name), { value: name })));
-  if (before !== undefined) select.value = before;
+  if (chosen !== undefined) select.value = chosen;
 }
 
 /** Pixels of the page in one of an element, which may be zoomed. */
