@@ -6,18 +6,18 @@ import { loadPage, runTests } from "./page_loader.mjs";
 
 globalThis.document = { documentElement: {} };
 const [sources, libraries] = process.argv.slice(2);
-const { fromFile, Recording, Session, McapWriter, setLanguage } = await loadPage(sources, libraries, [
-  'export { fromFile, Recording } from "./recording";', 'export { Session } from "./session";', 'export { McapWriter } from "@mcap/core";', 'export { setLanguage } from "./strings";',
+const { fromFile, Recording, whyUnreadable, Session, McapWriter, setLanguage } = await loadPage(sources, libraries, [
+  'export { fromFile, Recording, whyUnreadable } from "./recording";', 'export { Session } from "./session";', 'export { McapWriter } from "@mcap/core";', 'export { setLanguage } from "./strings";',
 ]);
 const ZERO = { p: [0, 0, 0], q: [1, 0, 0, 0] };
 const at = (id, x) => ({ object_id: id, epoch: 1, X_WO: { ...ZERO, p: [x, 0, 0] } });
 
 /** A file that is written, and what reads it. */
-async function started() {
+async function started(options) {
   const parts = [];
   let size = 0n;
   const writable = { position: () => size, write: async (bytes) => void (parts.push(bytes.slice()), (size += BigInt(bytes.length))) };
-  const writer = new McapWriter({ writable });
+  const writer = new McapWriter({ writable, ...options });
   await writer.start({ profile: "", library: "" });
   const whole = async () => {
     await writer.end();
@@ -28,8 +28,8 @@ async function started() {
 }
 
 /** A recording of [time in s, topic, message]; without such a topic no session is announced. */
-async function recorded(messages, metadata) {
-  const { writer, whole } = await started();
+async function recorded(messages, metadata, options) {
+  const { writer, whole } = await started(options);
   const channels = new Map();
   for (const [seconds, topic, message] of messages) {
     if (!channels.has(topic)) {
@@ -71,7 +71,7 @@ const tests = {
     const files = [
       [await foreign("imu", "ros1", "sensor_msgs/Imu", "ros1msg"), /written by something else/, /hat etwas anderes geschrieben/],
       [await foreign("Telemetry", "protobuf", "car.Telemetry", "protobuf"), /written by something else/, /hat etwas anderes geschrieben/],
-      [await recorded([...inputs, [0.1, "Checkpoint", {}]]), /journal of a server.*`tenon resimulate`/, /Journal eines Servers.*`tenon resimulate`/],
+      [await recorded([...inputs, [0.1, "Checkpoint", {}]]), /journal of a server.*`tenon resimulate FILE`/, /Journal eines Servers.*`tenon resimulate FILE`/],
       [await recorded([[0, "WorldFrame_100", { part: 0, parts: 1, tick: 0, states: [] }]]), /written by something else/, /hat etwas anderes geschrieben/],
     ];
     for (const [file, ...reasons] of files)
@@ -88,11 +88,40 @@ const tests = {
     const bytes = await whole.read(0n, await whole.size());
     const open = (...parts) => Recording.open(fromFile(new Blob(parts)), () => undefined, () => undefined);
     const rows = [
-      ["hello", /written by something else/], ["a longer text ".repeat(30), /written by something else/], [new Uint8Array(300_000), /written by something else/], ["", /no messages/],
-      ...[8, 12, 20, 40, bytes.length - 100, bytes.length - 1].map((length) => [bytes.subarray(0, length), /no index: it was cut off/]),
+      ["hello", /written by something else/], ["a longer text ".repeat(30), /written by something else/], [new Uint8Array(300_000), /written by something else/], ["", /is empty: no message/],
+      ...[8, 12, 20, 40, bytes.length - 100, bytes.length - 1].map((length) => [bytes.subarray(0, length), /was cut off before its end/]),
     ];
     for (const [file, reason] of rows) await assert.rejects(open(file), reason, `${file.length} bytes`);
     assert.equal((await open(bytes)).seconds, 0);
+  },
+
+  async "what is wrong with a file is said with its name and what reads it, and without the words of a library"() {
+    const whole = await recorded([[0, "SessionAnnounce", ANNOUNCED], [0, "WorldFrame_100", { part: 0, parts: 1, tick: 0, states: [] }]]);
+    const bytes = Buffer.from(await whole.read(0n, await whole.size()));
+    const empty = async (options) => {
+      const { writer, whole } = await started(options);
+      await writer.registerSchema({ name: "a", encoding: "jsonschema", data: new Uint8Array() });
+      return whole();
+    };
+    const unindexed = { useSummaryOffsets: false, useChunks: false, useStatistics: false, repeatSchemas: false, repeatChannels: false, useAttachmentIndex: false, useMetadataIndex: false };
+    const changed = (at) => {
+      const copy = Buffer.from(bytes);
+      copy[at] ^= 0xff;
+      return fromFile(new Blob([copy]));
+    };
+    const footer = bytes.length - 8 - 20;
+    const messages = bytes.indexOf("SessionAnnounce");
+    const moved = { size: async () => 1000n, read: () => Promise.reject(new DOMException("gone", "NotFoundError")) };
+    const rows = [
+      [await empty(), "is empty: no message was recorded"], [await empty(unindexed), "is empty: no message was recorded"],
+      [await recorded([[0, "SessionAnnounce", ANNOUNCED]], undefined, unindexed), "was written without an index.*`tenon report a b.mcap`"],
+      [changed(messages), "part of it is damaged.*`tenon report a b.mcap`"], [changed(footer + 2), "damaged.*`tenon report a b.mcap`"], [changed(footer - 12), "part of it is damaged.*`tenon report a b.mcap`"],
+      [moved, "no longer where it was"],
+    ];
+    for (const [file, reason] of rows) {
+      const problem = await Recording.open(file, () => undefined, () => undefined).then(() => assert.fail(reason), (problem) => problem);
+      assert.match(whyUnreadable(problem, "a b.mcap"), new RegExp(reason));
+    }
   },
 
   async "a seek tells what stations said last of their links"() {

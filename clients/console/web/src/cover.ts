@@ -4,6 +4,7 @@ import type { LiveState } from "./live";
 import type { Lobby } from "./lobby";
 import { strip } from "./panels";
 import type { Player } from "./player";
+import { whyUnreadable } from "./recording";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
 import { t, type Key } from "./strings";
@@ -27,10 +28,10 @@ export function reasonOfClose(text: string): string {
 
 
 /** `opening`: of a recording that is opened: how much is read, or why it cannot be. */
-export interface Opening { fraction: number; problem?: string }
-/** `chosen`: the session of the page's address; `only`: what the gateway shows, where that is one session or recording; `age`, `silence`: [s] since the last poses of the session, and since the last message of the gateway. */
+export interface Opening { fraction: number; problem?: unknown }
+/** `file`: the name of what is played; `chosen`: the session of the page's address; `only`: what the gateway shows, where that is one session or recording; `age`, `silence`: [s] since the last poses of the session, and since the last message of the gateway. */
 export interface Standing {
-  isDropping: boolean; opening?: Opening; player?: Player; lobby?: Lobby; live: LiveState; session: Session; view?: SceneView; chosen: string; only: string; age: number; silence: number;
+  isDropping: boolean; opening?: Opening; player?: Player; file: string; lobby?: Lobby; live: LiveState; session: Session; view?: SceneView; chosen: string; only: string; age: number; silence: number;
 }
 /** The page's address names a session, and its gateway shows another one, or a recording, alone. */
 export const isElsewhere = ({ chosen, only }: Pick<Standing, "chosen" | "only">): boolean => chosen !== "" && only !== "" && only !== chosen;
@@ -41,10 +42,10 @@ export interface Cover { state: string; icon: Icon; head: string; more: string; 
 export const isEmpty = (over: Cover | undefined, { session, lobby }: Standing): boolean => over?.covers === true && lobby === undefined && session.objects.size === 0;
 
 /** What covers the scene, if anything does. */
-export function coverOf({ isDropping, opening, player, lobby, live, session, view, chosen, only }: Standing): Cover | undefined {
+export function coverOf({ isDropping, opening, player, file, lobby, live, session, view, chosen, only }: Standing): Cover | undefined {
   if (isDropping) return { state: "drop", icon: "over", head: t("cover.drop"), more: t("cover.drop.more"), covers: true };
   const problem = opening?.problem ?? player?.problem;
-  if (problem !== undefined) return { state: "file", icon: "warn", head: t("cover.file"), more: problem, covers: true };
+  if (problem !== undefined) return { state: "file", icon: "warn", head: t("cover.file", { name: file }), more: whyUnreadable(problem, file), covers: true };
   if (opening !== undefined) return { state: "reading", icon: "wait", head: t("cover.reading"), more: t("cover.reading.more", { percent: Math.round(100 * opening.fraction) }), covers: true };
   if (isElsewhere({ chosen, only }) && player === undefined)
     return { state: "elsewhere", icon: "warn", head: t("cover.elsewhere", { name: chosen }), more: t("cover.elsewhere.more", { only }), leads: t("cover.elsewhere.show", { only }), covers: true };

@@ -169,7 +169,7 @@ sections.events.body.addEventListener("click", (event) => {
 let age = 0; // s since the last message
 const chosen = wanted.get("session") ?? "";
 let only = ""; // what this gateway shows, where that is one session or recording
-const standing = (): Standing => ({ isDropping, opening, player, lobby, live, session, view, chosen, only, age, silence: source?.silence ?? 0 });
+const standing = (): Standing => ({ isDropping, opening, player, file: fileName, lobby, live, session, view, chosen, only, age, silence: source?.silence ?? 0 });
 let shown = "";
 let shownAt = 0;
 let sought = 0; // places of a recording, when the last picture was drawn
@@ -293,7 +293,8 @@ function follow(room: string, { role, recordings, local }: Gateway): void {
     part.onLoss = (reason, again) => desk?.offer("hand", t("part.lost", { reason }), t("part.take.again"), again);
     part.onTaken = () => desk?.withdraw("hand");
     strip.append(part.take);
-    stage.append(part.bar, part.lesson);
+    stage.append(part.bar);
+    app.append(part.lesson);
     Object.assign(window, { tenon: { session, view, player, part } });
   }
   strip.prepend(desk.alarm);
@@ -354,7 +355,8 @@ async function play(file: Played): Promise<void> {
     else if (start !== null && Number.isFinite(Number(start))) player.seekTick(1000 * Number(start) || 1); // the first tick
   } catch (problem) {
     if (mine !== opens) return;
-    opening = { fraction: 0, problem: problem instanceof Error ? problem.message : String(problem) };
+    console.warn(problem);
+    opening = { fraction: 0, problem };
   }
   Object.assign(window, { tenon: { session, view, player } });
 }

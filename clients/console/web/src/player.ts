@@ -42,7 +42,7 @@ export class Player {
   time = 0; // s since the beginning of the recording
   isPlaying = false;
   /** Why the recording could not be read last; the next place may be. */
-  problem?: string;
+  problem?: unknown;
   /** The longest of the last seeks [ms]; for tests. */
   seekMilliseconds = 0;
   private speed = 1;
@@ -254,7 +254,8 @@ export class Player {
       await read();
     } catch (problem) {
       this.isPlaying = false;
-      this.problem = problem instanceof Error ? problem.message : String(problem);
+      console.warn(problem);
+      this.problem = problem;
     }
   }
 

@@ -29,11 +29,22 @@ const BLOCKS = 48; // that are kept
 const LARGEST = 1 << 26; // bytes of a chunk
 const LARGEST_WHOLE = 1 << 28; // bytes of a file that is read as a whole, where a server has no ranges
 
-/** Why a recording cannot be played, in the language of the page. */
+/** Why a recording cannot be played. */
 export class Unreadable extends Error {
-  constructor(key: Key, values: Record<string, string | number> = {}) {
-    super(t(key, values));
+  constructor(private key: Key, private values: Record<string, string | number> = {}) {
+    super(t(key, { name: "FILE", ...values }));
   }
+
+  /** In the language of the page, of the file of this name. */
+  of(name: string): string {
+    return t(this.key, { name, ...this.values });
+  }
+}
+
+/** Likewise of whatever went wrong: what the library and the browser say of a file, nobody who plays it understands. */
+export function whyUnreadable(problem: unknown, name: string): string {
+  const known = problem instanceof Unreadable ? problem : new Unreadable(problem instanceof DOMException ? "file.moved" : "file.damaged");
+  return known.of(name);
 }
 
 const MAGIC = [0x89, 0x4d, 0x43, 0x41, 0x50, 0x30, 0x0d, 0x0a]; // with which an MCAP file begins and ends
@@ -177,7 +188,31 @@ async function refuseOther(readable: Readable): Promise<void> {
     return MAGIC.every((byte, i) => bytes[i] === byte);
   };
   if (size < long || !(await isMagic(0n))) throw new Unreadable("file.foreign");
-  if (size < 2n * long || !(await isMagic(size - long))) throw new Unreadable("file.no_index");
+  if (size < 2n * long || !(await isMagic(size - long))) throw new Unreadable("file.cut");
+  if (await hasSummary(readable, size)) return;
+  throw new Unreadable((await hasMessages(readable, size)) ? "file.no_index" : "file.empty");
+}
+
+// records of MCAP: what they are, and how long
+const RECORD_HEAD = 9n;
+const [MESSAGE, CHUNK] = [0x05, 0x06];
+const FOOTER = 20n; // bytes of the last record
+
+async function hasSummary(readable: Readable, size: bigint): Promise<boolean> {
+  const at = size - BigInt(MAGIC.length) - FOOTER;
+  if (at < 0n) return false;
+  const start = await readable.read(at, 8n);
+  return start.some((byte) => byte !== 0);
+}
+
+/** Of a file without a summary, which would say so. */
+async function hasMessages(readable: Readable, size: bigint): Promise<boolean> {
+  for (let at = BigInt(MAGIC.length); at + RECORD_HEAD <= size; ) {
+    const head = await readable.read(at, RECORD_HEAD);
+    if (head[0] === MESSAGE || head[0] === CHUNK) return true;
+    at += RECORD_HEAD + new DataView(head.buffer, head.byteOffset).getBigUint64(1, true);
+  }
+  return false;
 }
 
 async function isInLockstep(reader: McapIndexedReader): Promise<boolean> {
@@ -205,10 +240,11 @@ export class Recording {
     await refuseOther(readable);
     const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers: { zstd: new Chunks().zstd } }).catch((problem: unknown) => {
       console.warn(problem); // what the library found instead, in its words
-      throw problem instanceof Unreadable || problem instanceof DOMException ? problem : new Unreadable("file.no_index");
+      throw problem instanceof Unreadable || problem instanceof DOMException ? problem : new Unreadable("file.damaged");
     });
     const { statistics } = reader;
-    if (statistics === undefined || statistics.messageCount === 0n) throw new Unreadable("file.empty");
+    if (statistics === undefined) throw new Unreadable("file.no_index");
+    if (statistics.messageCount === 0n) throw new Unreadable("file.empty");
     refuseKind(reader);
     const begin = await beginOf(reader, statistics.messageStartTime);
     const recording = new Recording(reader, handler, begin, Number(statistics.messageEndTime - begin) / 1e9);
