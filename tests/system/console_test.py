@@ -837,6 +837,8 @@ class Page(unittest.TestCase):
             browser("await", expression="tenon.view.models >= 3 && !document.querySelector('.take').hidden")
             browser("value", expression="document.querySelector('.take').click(), document.querySelector('dialog[open] .primary').click()")
             browser("await", expression="document.querySelector('.lesson').offsetHeight > 0 && document.querySelector('.arm').offsetHeight > 0")
+            beside = "document.querySelector('.lesson').getBoundingClientRect().left >= document.querySelector('.stage').getBoundingClientRect().right"
+            self.assertTrue(browser("value", expression=beside), "it covers neither a part nor its target")
             browser("value", expression="document.querySelector('.lesson .primary').click()")
             # Enter is for what has the focus; only from the scene it switches the hand on
             browser("value", expression="(a => { a.href = '#'; document.body.append(a); a.textContent = 'elsewhere'; a.focus(); })(document.createElement('a'))")
@@ -887,6 +889,8 @@ class Page(unittest.TestCase):
             browser("open", url=f"http://localhost:{port}/", width=390, height=844, theme="light", touch=True)
             browser("await", expression="tenon.view.models >= 3 && !document.querySelector('.take').hidden")
             browser("sit down")
+            lesson = browser("value", expression="document.querySelector('.lesson').textContent")
+            self.assertTrue("One finger" in lesson and "Two fingers" in lesson and "Ctrl" not in lesson, lesson)
             browser("await", expression="tenon.part.hand.isOn && tenon.part.hand.now.isActive")
             box = browser("value", expression="(b => [b.left + b.width / 2, b.top + b.height / 2])(tenon.view.canvas.getBoundingClientRect())")
             height = "[...tenon.session.hands.values()][0].X_WH.p[2]"
@@ -1012,7 +1016,7 @@ class Page(unittest.TestCase):
             self.beside(browser)
             # what cannot be read is said, and the next place can be
             fail_once = "((r, name) => { r[name] = () => { delete r[name]; return Promise.reject(new Error('the disk is gone')); }; })(tenon.player.recording, 'NAME')"
-            is_said = "!document.querySelector('.cover').hidden && document.querySelector('.cover').textContent.includes('the disk is gone')"
+            is_said = "!document.querySelector('.cover').hidden && document.querySelector('.cover').textContent.includes('A part of it is damaged')"
             browser("value", expression=fail_once.replace("NAME", "advance"))
             browser("await", expression=is_said)
             self.assertFalse(browser("value", expression="tenon.player.isPlaying"))
@@ -1041,7 +1045,7 @@ class Page(unittest.TestCase):
             cut.write_bytes(recording.read_bytes()[:100_000])
             with files_elsewhere(stage.out) as files:
                 _, port = start_console(stage, 0, "--recordings-from", files, shown=[])
-                for name, reason in (("cut", "It has no index"), ("journal", "It is the journal of a server")):
+                for name, reason in (("cut", "cut.mcap cannot be playedIt was cut off before its end. tenon report cut.mcap shows"), ("journal", "It is the journal of a server")):
                     browser("open", url=f"http://localhost:{port}/?file={urllib.parse.quote(f'{files}/open/{name}.mcap', safe='')}", width=1280, height=800, theme="dark")
                     browser("await", expression=f"document.querySelector('.cover').textContent.includes('{reason}')")
 

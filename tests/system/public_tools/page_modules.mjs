@@ -172,7 +172,7 @@ function sessionOf({ hands = ["right"], steps = [] } = {}) {
 let seq = 0;
 const tell = (session, tick, kind, text) => session.receive("EventLog", { seq: BigInt(++seq), tick: BigInt(tick), severity: 0, kind, text }, false);
 const stateOf = (session) => Object.fromEntries(session.steps.map(({ name, phase }) => [name, phase]));
-const [DONE, RUNNING, STOPPED] = [2, 1, 5];
+const [DONE, RUNNING, PAUSED, STOPPED] = [2, 1, 2, 5];
 
 /** What the graphics hardware would hold of a scene. */
 function heldBy(scene) {
@@ -798,6 +798,28 @@ const tests = {
     assert.deepEqual(ticks, [...ticks].sort((a, b) => a - b));
     const [notes, safety] = ["note", "safety"].map((kind) => session.events.filter((event) => event.kind === kind));
     assert.deepEqual([notes.length, safety.length, Number(safety[0].seq)], [50, 200, 800], "the newest are kept");
+  },
+
+  "a step with a time limit says what is left of it, more plainly in its last fifth, and one without a limit says nothing"() {
+    const session = sessionOf({ steps: ["a"] });
+    const cardAt = (tick, timeout) => {
+      session.tick = tick;
+      session.step = { step: 0, steps: 1, name: "a", title: [], instruction: [], part: "", phase: 1, started: 1000n, timeout, has_target: false };
+      const card = new Element("div");
+      card.append(...panels.instruction(session));
+      return card.all("p").filter(({ className }) => className.startsWith("limit")).map(({ className, textContent }) => [className, textContent]);
+    };
+    session.receive("RunState", { phase: RUNNING, tick: 0n, reason: "" }, false);
+    assert.deepEqual(cardAt(1000, 90), [["limit", "Time left: 1:30 of 1:30"]]);
+    assert.deepEqual(cardAt(31_400, 90), [["limit", "Time left: 1:00 of 1:30"]]);
+    assert.deepEqual(cardAt(73_000, 90), [["limit soon", "Time left: 0:18 of 1:30"]]);
+    assert.deepEqual(cardAt(99_000, 90), [["limit soon", "Time left: 0:00 of 1:30"]]);
+    assert.deepEqual(cardAt(31_400, 0), []);
+    // the time of a step stands still in a pause
+    session.receive("RunState", { phase: PAUSED, tick: 11_000n, reason: "" }, false);
+    setLanguage("de");
+    assert.deepEqual(cardAt(99_000, 90), [["limit", "Zeit: noch 1:20 von 1:30"]]);
+    setLanguage("en");
   },
 
   "the time of a step that runs is its own in a page that is opened late, too"() {

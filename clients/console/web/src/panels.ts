@@ -56,6 +56,17 @@ export function waitsFor(session: Session): string {
   return names === undefined ? t("run.waiting.more") : t("run.waiting.for", { missing: missingOf(session, names) });
 }
 
+const SOON = 0.2; // of a step's time limit, when it is nearly over
+
+/** What is left of the time of the step that runs; undefined where it has no limit. */
+export function timeLeft(session: Session): { text: string; isSoon: boolean } | undefined {
+  const limit = session.step?.timeout ?? 0;
+  const seconds = session.steps.find(({ isNow }) => isNow)?.seconds;
+  if (limit <= 0 || seconds === undefined) return undefined;
+  const left = Math.max(0, limit - seconds);
+  return { text: t("step.left", { left: clock(Math.ceil(left)), limit: clock(limit) }), isSoon: left <= SOON * limit };
+}
+
 export function instruction(session: Session): Node[] {
   const { step, run } = session;
   const badges = [phase(session)].filter((one) => one !== undefined);
@@ -64,7 +75,9 @@ export function instruction(session: Session): Node[] {
   if (step === undefined) return [h("div", "card-head", ...badges), h("p", "instruction muted", t("step.none"))];
   const count = h("span", "muted", t("step.count", { step: step.step + 1, steps: step.steps }));
   const head = h("div", "card-head", count, h("span", "part", session.retitled(step.part)), ...badges);
-  return [head, h("h1", "step-title", localized(step.title) || step.name), h("p", "instruction", localized(step.instruction)), ...conditions(session)];
+  const time = timeLeft(session);
+  const limit = time === undefined ? [] : [h("p", time.isSoon ? "limit soon" : "limit", icon(time.isSoon ? "warn" : "wait"), time.text)];
+  return [head, h("h1", "step-title", localized(step.title) || step.name), h("p", "instruction", localized(step.instruction)), ...limit, ...conditions(session)];
 }
 
 function meter(label: string, text: string, fraction: number, isMet: boolean): HTMLElement {

@@ -7,7 +7,7 @@ import { Hand } from "./hand";
 import { hasHeadset, Headset, type CardText } from "./headset";
 import type { DeskAnswer, LiveSource } from "./live";
 import { NONE, Role, RunPhase } from "./messages";
-import { reasonOfEnd } from "./panels";
+import { reasonOfEnd, timeLeft } from "./panels";
 import type { SceneView } from "./scene";
 import { askForSeat, SEATS, type SeatName } from "./seat";
 import type { Session } from "./session";
@@ -19,7 +19,13 @@ const LOUDEST = 10; // [N]
 const HOLD_PERIOD = 30; // [ms] in which a button that is held moves the hand
 const ICONS_ONLY: Key[] = ["part.sound", "part.help"];
 const MOVES: Key[] = ["part.nearer", "part.farther", "part.turn", "part.fine", "part.depth", "part.align"]; // nothing, while the hand is held still
-const GESTURES = ["drag", "wheel", "depth", "turn", "vertical", "align", "fine", "look", "view"] as const;
+/** What moves the hand, and what it does: of mouse and keys, and of a finger and the buttons below the scene. */
+const GESTURES = (["drag", "wheel", "depth", "turn", "vertical", "align", "fine", "look", "view"] as const).map((name): [Key, Key] => [`part.do.${name}`, `part.does.${name}`]);
+const TOUCHES: [Key, Key][] = [
+  ["part.do.finger", "part.does.drag"], ["part.do.hold", "part.does.hold"], ["part.depth", "part.does.depth"], ["part.turn", "part.does.turning"], ["part.align", "part.does.align"],
+  ["part.fine", "part.does.fine"], ["part.look", "part.does.look"], ["part.do.fingers", "part.does.fingers"],
+];
+const HEADSET: [Key, Key] = ["part.do.headset", "part.does.headset"];
 
 export class Part {
   readonly take = h("button", "take");
@@ -35,6 +41,7 @@ export class Part {
   private audio?: AudioContext;
   private headset?: Headset;
   private hasHeadset = false;
+  private byTouch = matchMedia("(pointer: coarse)"); // the person points with a finger
   /** What is wrong with the stop, for a headset, in which nothing of the page is seen; and how the loss of a place is said. */
   alarm: () => string = () => "";
   onLoss?: (reason: string, again: () => void) => void;
@@ -56,6 +63,7 @@ export class Part {
     });
     lookForHeadset();
     navigator.xr?.addEventListener("devicechange", lookForHeadset, { signal: this.isEnded.signal });
+    this.byTouch.addEventListener("change", () => this.setWords(), { signal: this.isEnded.signal });
     this.take.addEventListener("click", () => (this.hand === undefined ? this.ask() : void this.leave()));
     this.arm.addEventListener("click", () => this.hand?.press());
     source.onHandNotice = (answer) => {
@@ -114,7 +122,7 @@ export class Part {
       button.title = t(key);
     }
     this.arm.replaceChildren(icon("on"), t("part.arm"), h("kbd", "", t("part.arm.key")));
-    const rows = [...GESTURES, ...(this.hasHeadset ? ["headset"] : [])].map((name) => h("li", "", h("kbd", "", t(`part.do.${name}` as Key)), h("span", "", t(`part.does.${name}` as Key))));
+    const rows = [...(this.byTouch.matches ? TOUCHES : GESTURES), ...(this.hasHeadset ? [HEADSET] : [])].map(([gesture, does]) => h("li", "", h("kbd", "", t(gesture)), h("span", "", t(does))));
     const close = h("button", "primary", t("part.understood"));
     close.addEventListener("click", () => this.teach(false));
     this.lesson.replaceChildren(h("h2", "", t("part.lesson")), h("ul", "gestures", ...rows), h("div", "row end", close));
@@ -230,7 +238,7 @@ export class Part {
     const isStopped = session.isRaised;
     const state = hand === undefined ? "" : this.describe(hand, isStopped).map((node) => node.textContent ?? "").filter((text) => text !== "").join(" · ");
     return {
-      head: step === undefined ? "" : t("step.count", { step: step.step + 1, steps: step.steps }),
+      head: step === undefined ? "" : [t("step.count", { step: step.step + 1, steps: step.steps }), timeLeft(session)?.text ?? ""].filter((text) => text !== "").join(" · "),
       title: session.isOver ? reasonOfEnd(session) : step === undefined ? t("step.none") : localized(step.title) || step.name,
       text: session.isOver || step === undefined ? "" : localized(step.instruction),
       state: this.alarm() !== "" ? this.alarm() : isStopped || hand?.isOn === true ? state : t("part.headset.arm"),
