@@ -143,6 +143,10 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
   if (welded.skipped > 0) {
     info.notes += std::to_string(welded.skipped) + " triangles without area or present twice were skipped.\n";
   }
+  if (welded.joined + welded.split > 0) {
+    info.notes += std::to_string(welded.joined + welded.split) +
+                  " vertices and edges of open borders were stitched to others at the same place.\n";
+  }
   if (welded.closed > 0) {
     info.notes += std::to_string(welded.closed) + " holes of one missing triangle were closed.\n";
   }

@@ -117,6 +117,17 @@ TriangleTree::TriangleTree(std::span<const structures::Triangle> triangles, doub
   builder.build(0, builder.parts);
 }
 
+std::vector<std::uint32_t> TriangleTree::within(const Vector3& p, double radius) const {
+  std::vector<std::uint32_t> near;
+  visitWithin(p, radius, [&](const structures::Triangle& triangle) {
+    near.push_back(static_cast<std::uint32_t>(&triangle - triangles_.data()));
+    return false;
+  });
+  std::sort(near.begin(), near.end());
+  near.erase(std::unique(near.begin(), near.end()), near.end());  // long ones come more than once
+  return near;
+}
+
 bool TriangleTree::maybeNear(const Vector3& centre, double half_edge, double radius) const {
   if (nodes_.empty()) return false;
   const auto nearBox = [&](const structures::Triangle& t) {

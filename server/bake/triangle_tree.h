@@ -51,6 +51,9 @@ class TriangleTree {
     return false;
   }
 
+  /// The triangles nearer to p than `radius` [m], in the order of the soup.
+  [[nodiscard]] std::vector<std::uint32_t> within(const Vector3& p, double radius) const;
+
   /// Whether a triangle is nearer to p than `radius` [m].
   [[nodiscard]] bool anyWithin(const Vector3& p, double radius) const {
     return visitWithin(p, radius, [](const structures::Triangle&) { return true; });

@@ -126,11 +126,6 @@ std::vector<std::uint32_t> weld(std::span<const Vector3f> points, std::vector<Ve
 WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
   const std::vector<std::uint32_t> number = weld(mesh.vertices, positions);
 
-  struct WoundCorners {
-    Corners corners;
-    std::int8_t winding;  // of the mesh's triangle, beside ascending order
-    auto operator<=>(const WoundCorners&) const = default;
-  };
   std::vector<WoundCorners> all;
   all.reserve(mesh.triangles.size());
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -139,6 +134,17 @@ WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
     std::sort(t.begin(), t.end());
     if (t[0] != t[1] && t[1] != t[2]) all.push_back({t, static_cast<std::int8_t>(same ? 1 : -1)});
   }
+  build(std::move(all));
+  skipped = mesh.triangles.size() - triangles.size();
+  stitch();
+  closeHoles();
+  winding.resize(triangles.size(), 0);
+}
+
+void WeldedMesh::build(std::vector<WoundCorners> all) {
+  corners.clear();
+  triangles.clear();
+  winding.clear();
   // ranks follow positions, so neighbours in space are near in memory
   sortWithFirst(all, positions.size(), [](const WoundCorners& t) { return t.corners[0]; });
   for (const auto& [t, wound] : all) {
@@ -152,9 +158,6 @@ WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
     triangles.push_back(triangle);
     winding.push_back(wound);
   }
-  skipped = mesh.triangles.size() - triangles.size();
-  closeHoles();
-  winding.resize(triangles.size(), 0);
 }
 
 std::vector<WeldedMesh::HalfEdge> WeldedMesh::halfEdges() const {
@@ -170,6 +173,14 @@ std::vector<WeldedMesh::HalfEdge> WeldedMesh::halfEdges() const {
   return all;
 }
 
+std::vector<WeldedMesh::HalfEdge> WeldedMesh::openEdges() const {
+  std::vector<HalfEdge> open;
+  visitEdges(halfEdges(), [&open](std::span<const HalfEdge> edge) {
+    if (edge.size() == 1) open.push_back(edge.front());
+  });
+  return open;
+}
+
 double WeldedMesh::dihedralCosine(std::uint32_t triangle, std::uint32_t a, std::uint32_t b,
                                   std::uint32_t beyond) const {
   const Vector3& p_Ma = positions[a];
@@ -179,14 +190,11 @@ double WeldedMesh::dihedralCosine(std::uint32_t triangle, std::uint32_t a, std::
 }
 
 void WeldedMesh::closeHoles() {
-  // open edges, in both directions
-  std::vector<HalfEdge> open;
-  visitEdges(halfEdges(), [&open](std::span<const HalfEdge> edge) {
-    if (edge.size() != 1) return;
-    const auto& [from, to, triangle] = edge.front();
-    open.push_back({from, to, triangle});
+  std::vector<HalfEdge> open = openEdges();
+  for (std::size_t i = 0, count = open.size(); i < count; ++i) {  // in both directions
+    const auto [from, to, triangle] = open[i];
     open.push_back({to, from, triangle});
-  });
+  }
   std::sort(open.begin(), open.end());
   const auto at = [&open](std::uint32_t corner) {
     return std::ranges::equal_range(open, corner, {}, &HalfEdge::from);

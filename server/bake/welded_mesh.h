@@ -13,9 +13,11 @@ namespace tenon::bake {
 /// order of the input.
 ///
 /// Vertex numbers are ranks of positions, and each triangle lists its vertices in ascending order. Triangles
-/// without area and duplicates are skipped. A hole of one triangle, bounded by three open edges and without a
-/// sharp angle to at least one neighbour, is closed: such a triangle is missing in the file, and the flood
-/// fill would enter the solid through a large one.
+/// without area and duplicates are skipped. Open edges that are one line of the shape are stitched, since
+/// CAD programs tessellate each face by itself: vertices of theirs that differ by rounding (kStitch) become
+/// one, and a triangle is split where a vertex of another one is on its open edge (a T-junction). A hole of
+/// one triangle, bounded by three open edges and without a sharp angle to at least one neighbour, is closed:
+/// such a triangle is missing in the file, and the flood fill would enter the solid through a large one.
 ///
 /// Threads: constant after construction. Real-time: no.
 struct WeldedMesh {
@@ -38,9 +40,14 @@ struct WeldedMesh {
   /// components.
   [[nodiscard]] std::pair<std::vector<std::uint32_t>, std::uint32_t> components() const;
 
+  /// [m] Vertices of open edges closer than this, or than 1e-4 of the mesh's diagonal, are one.
+  static constexpr double kStitch = 5e-6;
+
   std::size_t skipped = 0;  ///< triangles without area, or duplicates
+  std::size_t joined = 0;   ///< vertices of open edges that became another one
+  std::size_t split = 0;    ///< open edges at T-junctions
   std::size_t closed = 0;   ///< holes; the triangles that close them are the last ones
-  std::vector<Vector3> positions;
+  std::vector<Vector3> positions;  ///< those of joined vertices are not used
   std::vector<Corners> corners;
   std::vector<structures::Triangle> triangles;
   /// Of each triangle how many of the mesh have its corners in this order, less those in the other one [-]; 0
@@ -52,8 +59,21 @@ struct WeldedMesh {
     std::uint32_t from, to, triangle;
     auto operator<=>(const HalfEdge&) const = default;
   };
+  struct WoundCorners {
+    Corners corners;
+    std::int8_t winding;  // of the mesh's triangle, beside ascending order
+    auto operator<=>(const WoundCorners&) const = default;
+  };
+  /// Replaces the triangles by `all`, without those that have no area or are there before.
+  void build(std::vector<WoundCorners> all);
   /// The edges of all triangles, sorted by their vertices.
   [[nodiscard]] std::vector<HalfEdge> halfEdges() const;
+  /// Those of one triangle.
+  [[nodiscard]] std::vector<HalfEdge> openEdges() const;
+  void stitch();
+  void joinVertices(const std::vector<HalfEdge>& open, double near);
+  /// Splits at most one edge of each triangle; false: there was none.
+  bool splitEdges(double near);
   void closeHoles();
   /// Edges with one triangle, or with two the cosine of whose dihedral angle is above `cosine` [-] (-1:
   /// flat).
