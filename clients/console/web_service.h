@@ -50,7 +50,7 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   void sendHeartbeat();
   /// The connection is closed: its room is no more.
   void leaveRoom();
-  void close(const std::string& reason);
+  void close(const std::string& reason, websocket::close_code code = websocket::close_code::policy_error);
   /// Ends the connection without waiting for the other side.
   void abort();
   [[nodiscard]] ViewerId id() const { return id_; }
@@ -82,7 +82,7 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   std::map<SubscriptionId, ChannelId> subscriptions_;
   ViewerQueue queue_;
   ViewerQueue::Item sent_;
-  std::string close_reason_;
+  websocket::close_reason close_reason_;
   std::chrono::steady_clock::time_point second_;
   int received_ = 0;  ///< messages, since second_
   bool has_seat_ = false, has_hands_ = false;

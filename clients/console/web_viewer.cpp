@@ -49,7 +49,7 @@ void WebViewer::run(const http::request<http::empty_body>& request, std::string_
         answer.set(http::field::sec_websocket_protocol, name);
         answer.set(http::field::server, "tenon");
       }));
-  socket_.read_message_max(kMaxMessageBytes);
+  socket_.read_message_max(0);  // counted in read(): the library would end the connection without a reason
   socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
     if (!error) self->begin();
   });
@@ -118,13 +118,15 @@ void WebViewer::sendHeartbeat() {
 
 void WebViewer::leaveRoom() { close("the session is over"); }
 
+/// A piece of a message, and as much of one that is too long as shows that it is.
 void WebViewer::read() {
-  socket_.async_read(incoming_, [self = shared_from_this()](beast::error_code error, std::size_t) {
-    if (error) {
-      self->abort();
-      return;
-    }
-    if (!self->is_closing_) self->receive();
+  const std::size_t most = kMaxMessageBytes + 1 - incoming_.size();
+  socket_.async_read_some(incoming_, most, [self = shared_from_this()](beast::error_code error, std::size_t) {
+    if (error) return self->abort();
+    if (self->is_closing_) return;
+    if (self->incoming_.size() > kMaxMessageBytes)
+      return self->close("a message longer than 64 kB", websocket::close_code::too_big);
+    if (self->socket_.is_message_done()) self->receive();
     if (!self->is_closing_) self->read();
   });
 }
@@ -203,10 +205,10 @@ void WebViewer::apply(const ViewerRequest& request) {
   }
 }
 
-void WebViewer::close(const std::string& reason) {
+void WebViewer::close(const std::string& reason, websocket::close_code code) {
   if (is_closing_) return;
   is_closing_ = true;
-  close_reason_ = reason;
+  close_reason_ = {code, reason};
   if (!is_sending_) finish();
 }
 
@@ -218,7 +220,7 @@ void WebViewer::finish() {
     const auto viewer = self.lock();
     if (!error && viewer) viewer->abort();
   });
-  socket_.async_close({websocket::close_code::policy_error, close_reason_},
+  socket_.async_close(close_reason_,
                       [self = shared_from_this()](beast::error_code) { self->send_timer_.cancel(); });
 }
 

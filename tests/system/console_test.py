@@ -184,10 +184,17 @@ class Gateway(unittest.TestCase):
                         told.append(message["message"])
                 self.assertIn("there is no channel 999", told[0])
 
-            with Viewer(port) as huge, self.assertRaises((Closed, ConnectionError)):
+            with Viewer(port) as other, Viewer(port) as huge:
+                other.begin("/console")
+                huge.begin("/console")
+                huge.send(b'"' + (64 * 1024 - 2) * b"x" + b'"')
+                self.assertIn("not understood", huge.status(), "as long as a message may be")
                 huge.send(b'"' + 1_000_000 * b"x" + b'"')
-                while True:
-                    huge.receive()
+                with self.assertRaises(Closed) as closed:
+                    while True:
+                        huge.receive()
+                self.assertEqual((closed.exception.code, str(closed.exception)), (1009, "a message longer than 64 kB"))
+                self.assertEqual(json.loads(next(other.messages())[1])["state"], "searching", "others are not disturbed")
             with Viewer(port) as flood, self.assertRaises((Closed, ConnectionError)) as closed:
                 for _ in range(10_000):
                     flood.send('{"op":"unsubscribe","subscriptionIds":[1]}')

@@ -19,7 +19,11 @@ class Refused(Exception):
 
 
 class Closed(Exception):
-    """The server has closed the connection; `reason` is what it said."""
+    """The server has closed the connection, and says why; `code`: of the WebSocket protocol, None where the connection just ended."""
+
+    def __init__(self, text, code=None):
+        super().__init__(text)
+        self.code = code
 
 
 def connect(port, tls=None, timeout=20, receive_buffer=None):
@@ -105,7 +109,7 @@ class Viewer:
             payload = self.take(size)
             opcode = first & 0x0F
             if opcode == 8:
-                raise Closed(payload[2:].decode("utf-8", "replace"))
+                raise Closed(payload[2:].decode("utf-8", "replace"), int.from_bytes(payload[:2], "big"))
             if opcode == 9:
                 self.send(payload, 10)
                 continue

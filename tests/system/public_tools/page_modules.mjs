@@ -856,9 +856,10 @@ const tests = {
     const moreOf = (reason) => coverOf({ live: { kind: "reconnecting", seconds: 8, reason }, session, view: {}, chosen: "", only: "", age: 0 }).more;
     assert.match(moreOf(""), /start `tenon console` again/);
     assert.match(moreOf("a newer viewer came: 192 look on here at most, without a seat or hands"), /a newer page came, and no more than 192 .* in 8 s/);
+    assert.match(moreOf("a message longer than 64 kB"), /this page sent a message longer than 64 kB.* in 8 s/);
     assert.match(moreOf("the moon is full"), /the moon is full/);
     setLanguage("de");
-    for (const reason of ["a newer viewer came: 192 look on here at most, without a seat or hands", "more than 200 messages a second", "more was asked for than was read", "the session is over"])
+    for (const reason of ["a newer viewer came: 192 look on here at most, without a seat or hands", "more than 200 messages a second", "a message longer than 64 kB", "more was asked for than was read", "the session is over"])
       assert.ok(!moreOf(reason).includes(reason), reason);
     setLanguage("en");
   },

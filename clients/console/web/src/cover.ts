@@ -15,6 +15,7 @@ const COMMAND = "./tenon demo";
 const CLOSES: [RegExp, Key][] = [
   [/^a newer viewer came: (?<count>\d+) /, "closed.crowded"],
   [/^more than \d+ messages a second/, "closed.messages"],
+  [/^a message longer than (?<most>\d+) kB/, "closed.large"],
   [/^more was asked for than was read/, "closed.unread"],
   [/^the session is over/, "closed.over"],
 ];
