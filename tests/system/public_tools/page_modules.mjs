@@ -850,6 +850,27 @@ const tests = {
     assert.equal(reasonOfLoss("the cable is broken."), "the cable is broken");
   },
 
+  "what a server says of a stop of before, of who was removed and of a hand that is taken is in the page's language"() {
+    const session = sessionOf();
+    session.receive("EmergencyStop", { client_guid: "server", counter: 1, who: "server", reason: "it stood when this server started" }, false);
+    const removed = "you were removed from this session; ask the instructor to admit you to a new one";
+    setLanguage("de");
+    assert.equal(panels.strip(session).text, "Not-Halt von Server: er stand, als dieser Server begann");
+    const stood = "engaged by server: it stood when the former server was killed";
+    assert.match(textOf(session, { kind: "emergency stop", text: stood }), /er stand, als der vorige Server beendet wurde/);
+    assert.equal(textOf(session, { kind: "refused", text: `Ada may not join: ${removed}` }), "Ada wurde aus dieser Sitzung entfernt und darf nicht wieder mitmachen");
+    assert.equal(reasonOfLoss(removed), "du wurdest aus dieser Sitzung entfernt");
+    assert.equal(reasonOfLoss("the server of session 'a' is gone; no server announced session 'a' within 10 s: start one"), "der Server ist weg");
+    assert.equal(reasonOf({ accepted: false, text: "hand 'right' is already moved by somebody else" }), "die Hand right bewegt schon jemand anders");
+    assert.equal(reasonOf({ accepted: false, text: removed }), "du wurdest aus dieser Sitzung entfernt");
+    const refused = coverOf({ live: { kind: "open" }, session: Object.assign(session, { link: { state: "refused", reason: removed, protocol: 1 } }), view: {}, chosen: "", only: "", age: 0 });
+    assert.equal(refused.more, "du wurdest aus dieser Sitzung entfernt");
+    // a person's own words stay
+    session.receive("EmergencyStop", { client_guid: "server", counter: 2, who: "Ada", reason: "the cat is gone" }, false);
+    assert.equal(panels.strip(session).text, "Not-Halt von Ada: the cat is gone");
+    setLanguage("en");
+  },
+
   "why the gateway has closed the connection is said in words of the page"() {
     const session = sessionOf();
     session.link = { state: "joined" };

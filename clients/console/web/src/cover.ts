@@ -1,5 +1,6 @@
 // What the page says of itself where it cannot show a session as it is: empty, loading, reconnecting, refused, old, not to be drawn.
 import type { Icon } from "./dom";
+import { reasonOfLoss } from "./eventtext";
 import type { LiveState } from "./live";
 import type { Lobby } from "./lobby";
 import { strip } from "./panels";
@@ -66,7 +67,7 @@ export function coverOf({ isDropping, opening, player, file, lobby, live, sessio
   if (player !== undefined) return view === undefined ? { state: "webgl", icon: "warn", head: t("cover.webgl"), more: t("cover.webgl.more"), covers: true } : undefined;
   if (live.kind === "connecting" || gateway === undefined) return make("connecting", "wait", true);
   if (gateway.protocol !== PROTOCOL) return make("protocol", "warn", true);
-  if (gateway.state === "refused") return { state: "refused", icon: "warn", head: t("cover.refused"), more: gateway.reason, covers: true };
+  if (gateway.state === "refused") return { state: "refused", icon: "warn", head: t("cover.refused"), more: reasonOfLoss(gateway.reason), covers: true };
   if (gateway.state === "searching" && only !== "") return { state: "searching", icon: "wait", head: t("cover.awaited", { name: only }), more: t("cover.awaited.more"), covers: true };
   if (gateway.state === "searching") return { ...make("searching", "wait", true), command: COMMAND };
   if (gateway.state === "lost") return make("lost", "warn", false);

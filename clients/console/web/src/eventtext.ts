@@ -26,6 +26,14 @@ const SAFETY = [
   "forces off",
   "not armed",
 ];
+/** What a server writes of a stop by itself. */
+const STOPS: Record<string, Key> = { "it stood when this server started": "stop.stood", "it stood when the former server was killed": "stop.stood.killed" };
+
+/** Why a stop was raised, or a request refused: a person's words, or one of a page's or of the server's. */
+export function reasonTold(text: string): string {
+  return STOPS[text] === undefined ? retold(text, "stop.reason", "refusal.stopped", "refusal.too_many") : t(STOPS[text]);
+}
+
 /** Texts by what they match. Groups: who and reason as they are; step, title, hand, role and word are translated. */
 const RULES: [RegExp, Key][] = [
   [/^(?<who>.+): a hand without input is held still after (?<freeze>\d+) ms and parked after (?<park>\d+) ms; inputs come up to (?<gap>\d+) ms apart, (?<lost>[\d.]+) % are lost$/, "event.link"],
@@ -53,6 +61,7 @@ const RULES: [RegExp, Key][] = [
   [/^(?<who>.+) \((?<role>\w+)\) has left$/, "event.left"],
   [/^(?<who>.+) \((?<role>\w+)\) was removed by (?<by>.+)$/, "event.removed"],
   [/^(?<who>.+) \((?<role>\w+)\) had left, was removed by (?<by>.+), and may not come back$/, "event.removed.away"],
+  [/^(?<who>.+) may not join: you were removed from this session/, "event.join.removed"],
   [/^(?<who>.+) may not join: (?<reason>.+)$/, "event.join.refused"],
   [/^(?<who>.+?): (?<word>\w+)(?: .*)? \(an emergency stop came before its tick\)$/, "event.dropped.stop"],
   [/^(?<who>.+?): (?<word>\w+)(?: .*)? \(the run has ended before its tick\)$/, "event.dropped.end"],
@@ -141,7 +150,7 @@ function value(session: Session, name: string, text: string): string {
     case "word": return command(text);
     case "who": case "by": return retold(text, ...SPEAKERS);
     case "seconds": case "ms": case "force": case "lost": return n(Number(text), /\.(\d+)/.exec(text)?.[1].length ?? 0);
-    case "reason": return retold(text, "stop.reason", "refusal.stopped", "refusal.too_many");
+    case "reason": return reasonTold(text);
     case "cause": return retold(text, "journal.slow", "journal.recorder");
     case "missing": return missingOf(session, text);
     case "rule": return SAFETY.includes(text) ? t(`safety.${SAFETY.indexOf(text)}` as Key) : text;
@@ -175,10 +184,16 @@ export function textOf(session: Session, event: Pick<EventLog, "kind" | "text">)
 /** Texts of the gateway and of the server, of a seat that is no more. */
 const LOSSES: [RegExp, Key][] = [
   [/ was removed by (?<by>[^;]+)/, "lost.removed"],
-  [/ is gone$/, "lost.gone"],
+  [/^you were removed from this session/, "lost.removed.somebody"],
+  [/ is gone(?:;|$)/, "lost.gone"],
   [/: has left$|has been silent for |join first$/, "lost.expired"],
   [/^nothing was heard of this page/, "lost.page"],
 ];
+
+/** Somebody who leads has removed the person, who is not to come back by himself. */
+export function isRemoval(text: string): boolean {
+  return LOSSES.find(([pattern]) => pattern.test(text))?.[1].startsWith("lost.removed") === true;
+}
 
 /** Why a seat was lost, in this page's language where it has words for it. */
 export function reasonOfLoss(text: string): string {
@@ -208,14 +223,19 @@ const ANSWERS: [RegExp, Key][] = [
   [/^the role (?<role>\w+) needs the key of the session: /, "refusal.needs_key"],
   [/^this gateway was not started with --role (?<role>\w+)$/, "refusal.other_role"],
   [/^there is no session yet$/, "refusal.record_none"],
+  [/^the key is not the one of this session/, "refusal.wrong_key"],
+  [/^hand '(?<hand>[^']+)' is already moved by somebody else$/, "refusal.hand_taken"],
+  [/^hand '(?<hand>[^']+)' belongs to the /, "refusal.hand_of"],
+  [/^the session has no such hand$/, "refusal.no_hand"],
+  [/^all (?:\d+ places|seats) of this gateway are taken$/, "refusal.full"],
 ];
 
 function answerOf(text: string): string {
   const known = ANSWERS.find(([pattern]) => pattern.test(text));
-  if (known === undefined) return text;
-  const role = known[0].exec(text)?.groups?.["role"] ?? "";
+  if (known === undefined) return reasonOfLoss(text);
+  const { role = "", hand = "" } = known[0].exec(text)?.groups ?? {};
   const title = `role.name.${role}`;
-  return t(known[1], { role, title: hasText(title) ? t(title) : role });
+  return t(known[1], { role, hand, title: hasText(title) ? t(title) : role });
 }
 
 /** What the gateway or the server answers, in this page's language where it has words for it. In English the server says more: it names what is missing. */

@@ -2,7 +2,7 @@
 import { Vector3 } from "three";
 
 import { forbid, h, icon, type Icon } from "./dom";
-import { conditionOf, interventions, kindOf, missingOf, modelOf, problemOfRecorder, textOf } from "./eventtext";
+import { conditionOf, interventions, kindOf, missingOf, modelOf, problemOfRecorder, reasonTold, textOf } from "./eventtext";
 import type { Label } from "./labels";
 import { NONE, Role, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
@@ -249,7 +249,7 @@ export function events(session: Session, leads: boolean): Node[] {
 /** The emergency strip: always there. */
 export function strip(session: Session): { text: string; isRaised: boolean } {
   const { raise } = session;
-  return raise === undefined ? { text: t("stop.none"), isRaised: false } : { text: t("stop.raised", { who: retold(raise.who, ...SPEAKERS), reason: retold(raise.reason, "stop.reason") }), isRaised: true };
+  return raise === undefined ? { text: t("stop.none"), isRaised: false } : { text: t("stop.raised", { who: retold(raise.who, ...SPEAKERS), reason: reasonTold(raise.reason) }), isRaised: true };
 }
 
 export function status(session: Session, age: number): Node[] {

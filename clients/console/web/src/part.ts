@@ -1,7 +1,7 @@
 // Taking part: a place in the session for who sits at this page, and what stands around the hand while it is taken.
 import { Dialog } from "./dialog";
 import { h, icon, marked, type Icon } from "./dom";
-import { reasonOfLoss } from "./eventtext";
+import { reasonOf, reasonOfLoss } from "./eventtext";
 import { gamepad } from "./gamepad";
 import { Hand } from "./hand";
 import { hasHeadset, Headset, type CardText } from "./headset";
@@ -308,7 +308,7 @@ export class Part {
   }
 
   private said(what: string, answer: DeskAnswer | undefined): void {
-    this.tell(answer?.accepted === true, `${what}: ${answer === undefined ? t("desk.offline") : answer.text || t(answer.accepted ? "desk.accepted" : "desk.refused")}`);
+    this.tell(answer?.accepted === true, `${what}: ${answer === undefined ? t("desk.offline") : reasonOf(answer) || t(answer.accepted ? "desk.accepted" : "desk.refused")}`);
   }
 
   /** The place is given up or lost. */

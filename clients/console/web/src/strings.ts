@@ -99,7 +99,7 @@ export function t(key: Key, values: Record<string, string | number> = {}): strin
 }
 
 /** What programs and people without a name are called. */
-export const SPEAKERS: Key[] = ["desk.somebody", "person.console", "person.trainee", "person.instructor", "person.observer", "person.recorder", "person.command_line"];
+export const SPEAKERS: Key[] = ["desk.somebody", "person.console", "person.trainee", "person.instructor", "person.observer", "person.recorder", "person.server", "person.command_line"];
 
 /** A text that a page of any language has sent, in this page's. */
 export function retold(text: string, ...keys: Key[]): string {
