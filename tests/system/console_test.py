@@ -708,7 +708,7 @@ class Page(unittest.TestCase):
             browser("await", expression=f"{offer}?.textContent.startsWith('You no longer move a hand: the connection to the gateway was lost')")
             browser.problems.clear()  # the browser reports the connections that were refused
             start_console(stage, port)
-            browser("await", expression=f"{offer}.querySelector('button').hidden === false && tenon.part.hand === undefined")
+            browser("await", expression=f"{offer}.hidden === false && tenon.part.hand === undefined")
 
     def test_a_session_that_is_not_running_is_named_and_looked_for_nightly(self):
         with Stage() as stage, Browser() as browser:
@@ -828,9 +828,57 @@ class Page(unittest.TestCase):
                 self.assertTrue(desk.ask("deskCommand", words=["kick", str(client)])["accepted"])
                 browser("await", expression="document.querySelector('[data-offer=seat]')?.textContent.startsWith('Your role has been withdrawn: Bob has removed you')")
                 self.assertTrue(browser("value", expression="document.querySelector('.desk').hidden && document.querySelector('.sit').textContent === 'Take a role'"))
+                # who was removed comes back by a decision alone: with the key, and for all to see
+                self.assertTrue(browser("value", expression="sessionStorage.getItem('role') === null && sessionStorage.getItem('pass') === null"))
+                self.assertEqual(browser("value", expression="document.querySelector('[data-offer=seat] button').textContent"), "Got it")
                 browser("value", expression="document.querySelector('[data-offer=seat] button').click()")
-                browser("await", expression="document.querySelector('dialog[open] h2')?.textContent === 'Take a role in this session'")
+                self.assertTrue(browser("value", expression="document.querySelector('[data-offer=seat]') === null && document.querySelector('dialog[open]') === null"))
+                browser("value", expression="document.querySelector('.sit').click()")
+                browser("await", expression="document.querySelector('dialog[open] .removed')?.textContent.startsWith('You were removed from this session')")
+                browser("value", expression="document.querySelector('dialog[open] .primary').click()")
+                browser("await", expression="[...document.querySelectorAll('.notice.bad')].some(n => n.textContent.includes('needs the key of the session'))")
+                browser("value", expression=f"document.querySelector('dialog[open] input[type=password]').value = '{pass_of(console)}', document.querySelector('dialog[open] .primary').click()")
+                browser("await", expression="document.querySelector('.desk').hidden === false && document.querySelector('dialog[open]') === null")
+                told = "tenon.session.events.filter(({ kind, text }) => ['join', 'leave'].includes(kind) && text.startsWith('somebody')).map(({ text }) => text.replace('somebody at the console (instructor) ', '')).join()"
+                browser("await", expression=f"{told} === 'has joined,was removed by Bob,has joined'")
             self.assertEqual(browser.problems, [])
+
+    def test_while_gateway_or_server_are_lost_one_notice_says_so_and_nothing_is_asked_of_them(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve(without_timeouts(SCENARIO, stage.out), "--wait-for", "right")
+            console, port = start_console(stage, 0, "--role", "instructor")
+            console.wait_for("joined session 'test'")
+            badge, cover = "document.querySelector('.top .badge').textContent", "document.querySelector('.cover')"
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
+            browser("await", expression=f"{badge} === 'Live' && document.querySelector('.sit').hidden === false")
+            # a message that is too long: the gateway says why it has closed the connection
+            browser("value", expression="document.querySelector('.sit').click(), document.querySelector('dialog[open] input[type=password]').value = 'x'.repeat(70000), document.querySelector('dialog[open] .primary').click()")
+            browser("await", expression=f"{cover}.textContent.includes('this page sent a message longer than 64 kB')")
+            browser("await", expression=f"{badge} === 'Live' && {cover}.hidden")
+
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light")
+            browser("await", expression="document.querySelector('.desk')?.hidden === false && tenon.view.models >= 3")
+            browser("sit down")
+            browser("await", expression="tenon.part.hand?.isOn === true")
+            commands = "[...document.querySelectorAll('.desk > button[data-command]')].filter(b => !b.hidden)"
+            browser("await", expression=f"{commands}.every(b => b.ariaDisabled === null)")
+            console.signal(signal.SIGSTOP)
+            browser("await", expression=f"{commands}.length > 4 && {commands}.every(b => b.ariaDisabled === 'true') && document.querySelector('.desk .why').textContent === 'nothing is heard of the gateway'")
+            self.assertTrue(browser("value", expression="document.querySelector('.desk input').disabled && document.querySelector('.sit').ariaDisabled === 'true' && document.querySelector('.people button') === null"))
+            self.assertTrue(browser("value", expression="[...document.querySelectorAll('.hand-tools button')].slice(0, 4).every(b => b.disabled) && document.querySelector('.stop').ariaDisabled === null"))
+            console.signal(signal.SIGCONT)
+            browser("await", expression=f"{badge} === 'Live' && {commands}.every(b => b.ariaDisabled === null) && !document.querySelector('.desk input').disabled")
+
+            server.signal(signal.SIGKILL)
+            browser("await", expression=f"{cover}.dataset.state === 'lost' && tenon.part.hand === undefined && document.querySelector('[data-offer=seat]') !== null")
+            notices = "[...document.querySelectorAll('.notice')].filter(n => n.offsetHeight > 0).map(n => n.textContent)"
+            take = "[document.querySelector('.take').ariaDisabled, document.querySelector('.take').title]"
+            self.assertEqual(browser("value", expression=f"[{notices}, {take}]"), [[], ["true", "the server is gone"]])
+            console.signal(signal.SIGKILL)
+            browser("await", expression=f"{badge} === 'Reconnecting' && {cover}.dataset.state === 'reconnecting'")
+            self.assertEqual(browser("value", expression=f"[{notices}, {take}]"), [[], ["true", "there is no connection to the gateway"]])
+            browser("value", expression="document.querySelector('.take').click()")
+            self.assertTrue(browser("value", expression="document.querySelector('dialog[open]') === null"))
 
     def test_a_mouse_mounts_the_first_part_and_the_session_resimulates(self):
         mouse_mounts(self, 1)

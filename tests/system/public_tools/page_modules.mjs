@@ -44,9 +44,9 @@ class Element extends Node {
 }
 globalThis.document = { documentElement: {}, createElement: (tag) => new Element(tag), createElementNS: (_, tag) => new Element(tag), createTextNode: (text) => new Node(text) };
 
-const { Presses, coverOf, isSilent, stopOf, LiveSource, setOptions, keep, kept, moment, Lobby, Session, panels, textOf, reasonOfLoss, reasonOf, whyNot, forbid, setLanguage, isTooEarly, Parts, Markers, Hand, Scene, Vector3, Quaternion, Matrix4, Mesh, BoxGeometry, BufferGeometry, Float32BufferAttribute, setAssetSource, hintAt, Together, arrange, nearestOf, Surface, problemOfRecorder, linkBadge } = await loadPage(...process.argv.slice(2), [
-  'export { Presses } from "./presses";', 'export { coverOf, isSilent, linkBadge, stopOf } from "./cover";', 'export { LiveSource } from "./live";', 'export { Lobby } from "./lobby";', 'export { Session } from "./session";', 'export * as panels from "./panels";',
-  'export { textOf } from "./eventtext";', 'export { reasonOfLoss, reasonOf } from "./eventtext";', 'export { whyNot } from "./permits";', 'export { forbid, setOptions } from "./dom";', 'export { isTooEarly } from "./pace";', 'export { keep, kept, moment, setLanguage } from "./strings";', 'export { Parts } from "./parts";', 'export { Markers } from "./markers";', 'export { Hand } from "./hand";',
+const { Presses, coverOf, isSilent, stopOf, whyCut, LiveSource, setOptions, keep, kept, moment, Lobby, Session, panels, textOf, reasonOfLoss, isRemoval, reasonOf, whyNot, forbid, setLanguage, isTooEarly, Parts, Markers, Hand, Scene, Vector3, Quaternion, Matrix4, Mesh, BoxGeometry, BufferGeometry, Float32BufferAttribute, setAssetSource, hintAt, Together, arrange, nearestOf, Surface, problemOfRecorder, linkBadge } = await loadPage(...process.argv.slice(2), [
+  'export { Presses } from "./presses";', 'export { coverOf, isSilent, linkBadge, stopOf, whyCut } from "./cover";', 'export { LiveSource } from "./live";', 'export { Lobby } from "./lobby";', 'export { Session } from "./session";', 'export * as panels from "./panels";',
+  'export { textOf } from "./eventtext";', 'export { isRemoval, reasonOfLoss, reasonOf } from "./eventtext";', 'export { whyNot } from "./permits";', 'export { forbid, setOptions } from "./dom";', 'export { isTooEarly } from "./pace";', 'export { keep, kept, moment, setLanguage } from "./strings";', 'export { Parts } from "./parts";', 'export { Markers } from "./markers";', 'export { Hand } from "./hand";',
   'export { hintAt } from "./player";', 'export { arrange } from "./labels";', 'export { Together } from "./beside";',
   'export { Scene, Vector3, Quaternion, Matrix4, Mesh, BoxGeometry, BufferGeometry, Float32BufferAttribute } from "three";', 'export { nearestOf, Surface } from "./nearest";', 'export { problemOfRecorder } from "./eventtext";', 'export { setAssetSource } from "./assets";',
 ]);
@@ -848,6 +848,15 @@ const tests = {
     assert.equal(reasonOfLoss("the server of session 'a' is gone"), "the server is gone");
     assert.equal(reasonOfLoss("refused: join first"), "the server has heard nothing of it for a while");
     assert.equal(reasonOfLoss("the cable is broken."), "the cable is broken");
+    for (const [text, removed] of [["the server of session 'a' removed this client: was removed by Ada", true], ["you were removed from this session; ask", true], ["the server of session 'a' is gone", false], ["the cable is broken.", false]])
+      assert.equal(isRemoval(text), removed, text);
+  },
+
+  "while gateway or server are lost nothing is asked of them, and why is said"() {
+    const why = (kind, silence, state) => whyCut({ live: { kind }, session: { link: { state } }, silence });
+    assert.deepEqual([why("open", 2, "joined"), why("open", 2, "ended")], [undefined, undefined]);
+    assert.deepEqual([why("reconnecting", 0, "joined"), why("connecting", 0, undefined)], ["cut.gateway", "cut.gateway"]);
+    assert.deepEqual([why("open", 5.1, "joined"), why("open", 0, "lost")], ["cut.silent", "lost.gone"]);
   },
 
   "what a server says of a stop of before, of who was removed and of a hand that is taken is in the page's language"() {

@@ -84,6 +84,13 @@ export function isSilent({ player, lobby, live, session, age, silence }: Standin
   return lobby === undefined && session.link?.state === "joined" && !session.link.lockstep && !session.isOver && age > SILENT;
 }
 
+/** Why nothing that is asked of the session would be answered now. */
+export function whyCut({ live, session, silence }: Pick<Standing, "live" | "session" | "silence">): Key | undefined {
+  if (live.kind !== "open") return "cut.gateway";
+  if (silence > DEAF) return "cut.silent";
+  return session.link?.state === "lost" ? "lost.gone" : undefined;
+}
+
 /** In lockstep there are no poses while a station is missing; what the server says of the stop is heard all the same. */
 const speaksWithoutPoses = ({ link, newestRaise }: Session): boolean => link?.lockstep === true && newestRaise !== undefined;
 

@@ -2,7 +2,7 @@
 import { Dialog, type Asked } from "./dialog";
 import { forbid, h, icon, marked, setOptions, type Icon } from "./dom";
 import type { DeskAnswer, LiveSource } from "./live";
-import { reasonOf, reasonOfLoss } from "./eventtext";
+import { isRemoval, reasonOf, reasonOfLoss } from "./eventtext";
 import { RunPhase, Status, type SceneObject } from "./messages";
 import { Pairs } from "./pairs";
 import { whyNot, type Permitted } from "./permits";
@@ -33,6 +33,8 @@ export class Desk {
   canRecord = false;
   /** Whether what is known of the stop is so now. */
   isHeard: () => boolean = () => true;
+  /** Why nothing that is asked here would be answered now. */
+  whyCut: () => Key | undefined = () => undefined;
   /** Sessions of which the server has not said that it knows of the stop. */
   unstopped: () => string[] = () => [];
   private dialog = new Dialog(() => void this.raise());
@@ -63,10 +65,15 @@ export class Desk {
     this.notices.setAttribute("role", "status");
     this.stop.addEventListener("click", () => void this.raise());
     this.clear.addEventListener("click", () => void this.command("clear"));
-    this.sit.addEventListener("click", () => (this.role === "" ? this.askForSeat() : void this.leave()));
+    this.sit.addEventListener("click", () => {
+      const why = this.whyCut();
+      if (why !== undefined) this.notify(false, `${this.sit.textContent}: ${t(why)}`);
+      else if (this.role === "") this.askForSeat();
+      else void this.leave();
+    });
     source.onNotice = (answer) => {
       this.role = answer.role;
-      if (answer.role === "") this.offerSeat(reasonOfLoss(answer.text));
+      if (answer.role === "") this.offerSeat(answer.text);
       else this.notify(false, answer.text);
       this.show();
     };
@@ -189,6 +196,8 @@ export class Desk {
 
   /** Why the server would refuse a command now, by its first word. */
   whyNot(word: string): Key | undefined {
+    const cut = this.whyCut();
+    if (cut !== undefined) return cut;
     if (word === "give" && this.role !== "" && this.hands[0].options.length === 0) return whyNot(word, this.permitted, this.session) ?? "refusal.nobody_there";
     if (word === "release" && this.role !== "" && !this.holdsAnything(this.hands[1].value)) return whyNot(word, this.permitted, this.session) ?? "refusal.holds_nothing";
     return whyNot(word, this.role === "" ? undefined : this.permitted, this.session);
@@ -235,9 +244,13 @@ export class Desk {
     const label = this.role === "" ? t("desk.sit") : t("desk.leave");
     if (this.sit.textContent !== label) this.sit.replaceChildren(icon("person"), label);
     this.sit.hidden = this.role === "" && session.link?.state !== "joined"; // in no session there is a seat
+    const cut = this.whyCut();
+    forbid(this.sit, cut === undefined ? "" : t(cut));
+    this.note.disabled = cut !== undefined;
     this.bar.hidden = this.role === "" || session.isOver;
     if (session.isOver) for (const name of ["seat", "hand"]) this.withdraw(name);
-    for (const offer of this.notices.querySelectorAll<HTMLElement>("[data-offer] button")) offer.hidden = session.isOver || session.link?.state !== "joined";
+    // until then it is said what is lost with all that was here
+    for (const offer of this.notices.querySelectorAll<HTMLElement>("[data-offer]")) offer.hidden = session.isOver || cut !== undefined || session.link?.state !== "joined";
     for (const { button, shows } of this.buttons) button.hidden = shows !== undefined && !shows();
     if (this.more.open) this.pairs.show();
     this.list();
@@ -268,9 +281,16 @@ export class Desk {
     this.show();
   }
 
-  private offerSeat(reason: string): void {
-    if (this.session.isOver) return;
-    this.offer("seat", t("desk.lost", { reason }), t("desk.sit.again"), () => this.askForSeat());
+  private offerSeat(cause: string): void {
+    if (!this.session.isOver) this.tellLoss("seat", t("desk.lost", { reason: reasonOfLoss(cause) }), cause, t("desk.sit.again"), () => this.askForSeat());
+  }
+
+  /** Says that a seat or a hand is lost, and offers to get it again; not to who was removed: whether to come back is to be decided anew, with the key where one is needed. */
+  tellLoss(name: string, text: string, cause: string, label: string, again: () => void): void {
+    if (!isRemoval(cause)) return this.offer(name, text, label, again);
+    this.session.hasRemovedUs = true;
+    for (const one of [ROLE, PASS]) keep(one, null, "tab");
+    this.offer(name, text, t("part.understood"), () => this.withdraw(name));
   }
 
   /** It is not shown any more. */
@@ -290,6 +310,7 @@ export class Desk {
     this.lastRefusal = answer === undefined ? t("desk.offline") : reasonOf(answer);
     if (answer?.accepted === true) {
       this.withdraw("seat");
+      this.session.hasRemovedUs = false;
       keep(PASS, key, "tab");
       keep(ROLE, role, "tab");
     }
@@ -309,7 +330,7 @@ export class Desk {
 
   private askForSeat(): void {
     this.asked = undefined;
-    askForSeat(this.dialog, { title: t("desk.sit.title"), action: t("desk.sit.do"), roles: ["instructor", "trainee"], done: (...seat) => this.takeSeat(...seat) });
+    askForSeat(this.dialog, { title: t("desk.sit.title"), action: t("desk.sit.do"), roles: ["instructor", "trainee"], wasRemoved: this.session.hasRemovedUs, done: (...seat) => this.takeSeat(...seat) });
   }
 
   /** Before this page leaves the session to play a file. */

@@ -1,10 +1,11 @@
 import "./style.css";
 
 import { FRAME, playsBeside, showBeside, tellBeside, type Played } from "./beside";
-import { coverOf, isElsewhere, isEmpty, isHeard, isSilent, linkBadge, PROTOCOL, stopOf, type Opening, type Standing } from "./cover";
+import { coverOf, isElsewhere, isEmpty, isHeard, isSilent, linkBadge, PROTOCOL, stopOf, whyCut, type Opening, type Standing } from "./cover";
 import { Desk } from "./desk";
 import { Dialog } from "./dialog";
 import { h, icon, marked, renew } from "./dom";
+import { reasonOfLoss } from "./eventtext";
 import { showKeys } from "./help";
 import { addressOf, LiveSource, type LiveState } from "./live";
 import { Lobby } from "./lobby";
@@ -209,7 +210,7 @@ function showPanels(): void {
   // a seek begins with nothing known: a row that it brings back keeps its focus
   if (player?.isReading !== true) {
     show(sections.steps.body, panels.steps(session, app.classList.contains("leads")));
-    show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName, self: desk?.client, whyNoTaking: whyNoTaking && t(whyNoTaking) }));
+    show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver && desk.whyCut() === undefined, hand: part?.handName, self: desk?.client, whyNoTaking: whyNoTaking && t(whyNoTaking) }));
     show(sections.events.body, panels.events(session, player !== undefined));
   }
   show(status, panels.status(session, age));
@@ -284,13 +285,15 @@ function follow(room: string, { role, recordings, local }: Gateway): void {
   desk = new Desk(source, session, role);
   desk.canRecord = recordings === true;
   desk.isHeard = () => isHeard(standing());
+  desk.whyCut = () => whyCut(standing());
   const { notify } = desk;
   if (view !== undefined) {
     part = new Part(source, session, view, (isGood, text) => notify.call(desk, isGood, text), () => void desk?.raise());
     part.isLocal = local === true;
     part.canClear = () => desk?.canClear === true;
     part.alarm = () => desk?.alarmText ?? "";
-    part.onLoss = (reason, again) => desk?.offer("hand", t("part.lost", { reason }), t("part.take.again"), again);
+    part.whyCut = () => whyCut(standing());
+    part.onLoss = (cause, again) => desk?.tellLoss("hand", t("part.lost", { reason: reasonOfLoss(cause) }), cause, t("part.take.again"), again);
     part.onTaken = () => desk?.withdraw("hand");
     strip.append(part.take);
     stage.append(part.bar);

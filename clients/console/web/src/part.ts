@@ -1,7 +1,7 @@
 // Taking part: a place in the session for who sits at this page, and what stands around the hand while it is taken.
 import { Dialog } from "./dialog";
-import { h, icon, marked, type Icon } from "./dom";
-import { reasonOf, reasonOfLoss } from "./eventtext";
+import { forbid, h, icon, marked, type Icon } from "./dom";
+import { reasonOf } from "./eventtext";
 import { gamepad } from "./gamepad";
 import { Hand } from "./hand";
 import { hasHeadset, Headset, type CardText } from "./headset";
@@ -44,10 +44,12 @@ export class Part {
   private byTouch = matchMedia("(pointer: coarse)"); // the person points with a finger
   /** What is wrong with the stop, for a headset, in which nothing of the page is seen; and how the loss of a place is said. */
   alarm: () => string = () => "";
-  onLoss?: (reason: string, again: () => void) => void;
+  onLoss?: (cause: string, again: () => void) => void;
   onTaken?: () => void;
   /** Whether the seat at this page may clear an emergency stop. */
   canClear: () => boolean = () => false;
+  /** Why nothing that is asked of the session would be answered now. */
+  whyCut: () => Key | undefined = () => undefined;
   isLocal = true; // nobody elsewhere reaches the gateway: a trainee needs no key
   private isAsking = false;
   private isEnded = new AbortController();
@@ -64,12 +66,17 @@ export class Part {
     lookForHeadset();
     navigator.xr?.addEventListener("devicechange", lookForHeadset, { signal: this.isEnded.signal });
     this.byTouch.addEventListener("change", () => this.setWords(), { signal: this.isEnded.signal });
-    this.take.addEventListener("click", () => (this.hand === undefined ? this.ask() : void this.leave()));
+    this.take.addEventListener("click", () => {
+      const why = this.whyCut();
+      if (this.hand !== undefined) void this.leave();
+      else if (why !== undefined) this.tell(false, `${t("part.take")}: ${t(why)}`);
+      else this.ask();
+    });
     this.arm.addEventListener("click", () => this.hand?.press());
     source.onHandNotice = (answer) => {
       this.end();
       if (session.isOver) tell(true, answer.text === "" ? t("part.over") : answer.text);
-      else this.onLoss?.(reasonOfLoss(answer.text), () => this.ask());
+      else this.onLoss?.(answer.text, () => this.ask());
     };
     source.onHands = (views) => this.hand?.receive(views);
     const add = (key: Key, name: Icon | undefined, act: () => void, options: { isPressed?: () => boolean; shows?: () => boolean } = {}): HTMLButtonElement => {
@@ -147,9 +154,11 @@ export class Part {
     const label = t(this.isAsking ? "part.asking" : hand === undefined ? "part.take" : "part.leave");
     if (this.take.textContent !== label) this.take.replaceChildren(icon("hand"), label);
     this.take.disabled = this.isAsking;
+    const cut = this.whyCut();
+    forbid(this.take, hand === undefined && cut !== undefined ? t(cut) : "");
     this.take.hidden = session.isOver || session.sceneHands.size === 0;
     if (!this.take.hidden && this.invited !== "" && session.link?.state === "joined") this.ask();
-    this.bar.hidden = hand === undefined;
+    this.bar.hidden = hand === undefined || session.link?.state === "lost";
     document.body.classList.toggle("takes-part", hand !== undefined);
     if (hand === undefined) return;
     if (session.step !== undefined && session.step.revision !== this.step) {
@@ -162,7 +171,7 @@ export class Part {
       if (![hand.guide.from, hand.guide.to].every((place) => this.view.isInSight(place))) this.look();
     }
     const stopped = session.isRaised;
-    this.arm.hidden = hand.isOn || stopped || hand.now === undefined;
+    this.arm.hidden = hand.isOn || stopped || hand.now === undefined || cut !== undefined;
     const texts = this.describe(hand, stopped);
     const node = h("div", "", ...texts);
     if (node.innerHTML !== this.state.innerHTML) this.state.replaceChildren(...node.childNodes);
@@ -180,6 +189,7 @@ export class Part {
     if (now === undefined) return [h("span", "", t("part.wait"))];
     const name = session.titleOf(now.objectId) || session.nameOfHand(this.ids[hand.current]);
     if (stopped) return [icon("stop"), h("b", "", name), h("span", "bad", ...marked(this.whatStopped()))];
+    if (this.whyCut() !== undefined) return [icon("warn"), h("b", "", name), h("span", "bad", t("part.still"))];
     if (!hand.isOn) return [icon("hand"), h("b", "", name), h("span", "", t("part.off"))];
     const still = this.stillness();
     if (still !== undefined) return [icon("hand"), h("b", "", name), h("span", "", t(still))];
@@ -199,6 +209,8 @@ export class Part {
   /** Why the hand does not move though it is on. */
   private stillness(): Key | undefined {
     const { run } = this.session;
+    const cut = this.whyCut();
+    if (cut !== undefined) return cut;
     if (run?.phase === RunPhase.Paused) return "part.paused";
     return run?.forces_frozen === true ? "part.frozen" : undefined;
   }
@@ -264,7 +276,7 @@ export class Part {
     const { invited } = this;
     this.invited = "";
     askForSeat(this.dialog, {
-      title: t("part.take"), what: t("part.what"), action: t("part.take"), wanted: invited,
+      title: t("part.take"), what: t("part.what"), action: t("part.take"), wanted: invited, wasRemoved: this.session.hasRemovedUs,
       roles: (["trainee", "instructor"] as const).filter((name) => this.handsOf(name).ids.length > 0),
       needsKey: (role) => role !== "trainee" || !this.isLocal,
       noteOf: (role) => {
@@ -293,6 +305,7 @@ export class Part {
     if (answer?.accepted !== true) this.end();
     this.said(t("part.take"), answer);
     if (answer?.accepted === true) {
+      this.session.hasRemovedUs = false;
       this.onTaken?.();
       hand.onContact = (force, index) => this.feel(force, index);
       this.step = -1;

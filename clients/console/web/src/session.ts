@@ -60,6 +60,8 @@ export class Session {
   hasPoses = false; // of this session
   /** Hands that the person at this page has. */
   ownHands: ReadonlySet<number> = new Set();
+  /** Somebody who leads has removed this person, who has not come back since. */
+  hasRemovedUs = false;
   private raises = new Map<string, EmergencyStop>(); // by client, the newest (StopTruth)
   private clears = new Map<string, number>(); // likewise, its number
   private saysNone = false; // the server, of the raises that were heard so far; nothing was heard of it since
