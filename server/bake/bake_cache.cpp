@@ -14,7 +14,7 @@ namespace tenon::bake {
 namespace {
 
 // Raised when a new release of this program computes other structures from the same meshes and options.
-constexpr std::uint32_t kBakeVersion = 22;
+constexpr std::uint32_t kBakeVersion = 23;
 // The same for display models.
 constexpr std::uint32_t kDisplayVersion = 2;
 

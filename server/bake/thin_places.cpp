@@ -37,8 +37,11 @@ constexpr double kSlope = 0.2;
 
 double noise(double voxel) { return std::min(kNoiseVoxels * voxel, kNoise); }
 
-/// [m] The interpolated distances kBeyond away from a point of the surface, on both sides.
-using Beyond = std::array<double, 2>;
+/// The interpolated distances kBeyond away from a point of the surface, on both sides.
+struct Beyond {
+  std::array<double, 2> distance;  // [m]
+  double cosine;                   // [-] of the gradients there
+};
 
 /// [m] Half the thickness of a thin wall at a point of its surface, where the interpolated distance is
 /// `outside` [m]. Beyond a wall of thickness t, s from the point, the distance is s - t. Another surface
@@ -46,7 +49,7 @@ using Beyond = std::array<double, 2>;
 /// (voxel - h)^2 / (2 voxel) at its surface, so that a larger `outside` bounds h.
 double halfThickness(const Beyond& beyond, double outside, double voxel) {
   const double most = voxel - std::sqrt(2.0 * std::max(outside, 0.0) * voxel);
-  return std::clamp(0.5 * std::abs(beyond[1] - beyond[0]), 0.0, std::max(most, 0.0));
+  return std::clamp(0.5 * std::abs(beyond.distance[1] - beyond.distance[0]), 0.0, std::max(most, 0.0));
 }
 
 /// [m] The dilation for a thin wall at whose exact surface the interpolated distance is `outside` [m]. Its
@@ -75,7 +78,9 @@ std::optional<Beyond> beyondWall(const Field& field, const Vector3& p_MP, const 
   for (const double side : {-voxel, voxel})
     if (field.sample(p_MP + side * normal_M).distance <= kInside * voxel) return std::nullopt;
   const Vector3 away = kBeyond * voxel * normal_M;
-  return Beyond{field.sample(p_MP - away).distance, field.sample(p_MP + away).distance};
+  const structures::FieldSample before = field.sample(p_MP - away);
+  const structures::FieldSample behind = field.sample(p_MP + away);
+  return Beyond{{before.distance, behind.distance}, before.gradient.dot(behind.gradient)};
 }
 
 /// [m] The lowest distance in the cell around p: that of one of its corners.
@@ -90,15 +95,18 @@ double lowestInCell(const Field& field, const Vector3& p_MP, double voxel) {
   return lowest;
 }
 
-/// Whether the wall of beyondWall() is thin: it is where air is straight behind it, and where no inside of
-/// 0.75 voxels is where the gradient leads inwards, or in the cell around the deepest place there.
+/// Whether the wall of beyondWall() is thin: it is where air is straight behind it and its faces are
+/// parallel, and where no inside of 0.75 voxels is where the gradient leads inwards, or in the cell around
+/// the deepest place there.
 bool isThinWall(const Field& field, Vector3 p_MP, const Beyond& beyond, double voxel) {
   constexpr double kAir = 0.9;  // [voxels] 2.5 voxels from the surface: behind a wall of 1.6 voxels at most
   constexpr double kStep = 0.25;
   constexpr int kSteps = 9;
   constexpr double kNoGradient = 0.1;  // [-] as in the middle of a thin wall
   constexpr double kBack = -0.5;       // [-] cosine of consecutive steps
-  if (std::min(beyond[0], beyond[1]) >= kAir * voxel) return true;
+  constexpr double kParallel = -0.9;   // [-] cosine of the normals of a wall's two faces
+  if (std::min(beyond.distance[0], beyond.distance[1]) >= kAir * voxel && beyond.cosine < kParallel)
+    return true;
   Vector3 before = Vector3::Zero();
   double lowest = 0.0;
   Vector3 p_MDeepest = p_MP;

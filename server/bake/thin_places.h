@@ -24,8 +24,9 @@ struct ThinPlaces {
 /// its exact surface, or zero where that is in a plane of samples. Each coarse brick gets the dilation that
 /// makes the zero level set as flat as the thinnest wall in it (see dilationFor in the .cpp); a corner gets
 /// the largest of its eight bricks. It changes by at most 0.2 mm a mm. A point whose neighbourhood has an
-/// inside is at a convex edge of a solid and does not count: offset surfaces are for sheets alone (Xu and
-/// Barbic 2014). Only coarse bricks marked in `thin` are measured.
+/// inside, or whose wall's two faces are not parallel and have an inside between them, is at a convex edge of
+/// a solid and does not count: offset surfaces are for sheets alone (Xu and Barbic 2014). Only coarse bricks
+/// marked in `thin` are measured.
 [[nodiscard]] ThinPlaces findThinPlaces(const structures::DistanceField& field,
                                         std::span<const structures::Triangle> surface, const BrickMarks& thin,
                                         ParallelWork& work);

@@ -43,10 +43,10 @@ struct WeldedMesh {
   /// [m] Vertices of open edges closer than this, or than 1e-4 of the mesh's diagonal, are one.
   static constexpr double kStitch = 5e-6;
 
-  std::size_t skipped = 0;  ///< triangles without area, or duplicates
-  std::size_t joined = 0;   ///< vertices of open edges that became another one
-  std::size_t split = 0;    ///< open edges at T-junctions
-  std::size_t closed = 0;   ///< holes; the triangles that close them are the last ones
+  std::size_t skipped = 0;         ///< triangles without area, or duplicates
+  std::size_t joined = 0;          ///< vertices of open edges that became another one
+  std::size_t split = 0;           ///< open edges at T-junctions
+  std::size_t closed = 0;          ///< holes; the triangles that close them are the last ones
   std::vector<Vector3> positions;  ///< those of joined vertices are not used
   std::vector<Corners> corners;
   std::vector<structures::Triangle> triangles;
@@ -71,8 +71,10 @@ struct WeldedMesh {
   /// Those of one triangle.
   [[nodiscard]] std::vector<HalfEdge> openEdges() const;
   void stitch();
+  /// Makes one of vertices of open edges that are closer than `near` [m].
   void joinVertices(const std::vector<HalfEdge>& open, double near);
-  /// Splits at most one edge of each triangle; false: there was none.
+  /// Splits open edges at vertices of others closer than `near` [m], at most one edge of each triangle;
+  /// false: there was none.
   bool splitEdges(double near);
   void closeHoles();
   /// Edges with one triangle, or with two the cosine of whose dihedral angle is above `cosine` [-] (-1:
