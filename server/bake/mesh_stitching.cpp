@@ -18,13 +18,6 @@ struct OnEdge {
   auto operator<=>(const OnEdge&) const = default;
 };
 
-/// The corners in ascending order, and by that permutation the sign of the winding.
-std::pair<WeldedMesh::Corners, int> ascending(WeldedMesh::Corners c) {
-  const bool even = ((c[0] < c[1]) + (c[1] < c[2]) + (c[2] < c[0])) == 2;
-  std::sort(c.begin(), c.end());
-  return {c, even ? 1 : -1};
-}
-
 }  // namespace
 
 void WeldedMesh::stitch() {
@@ -65,8 +58,8 @@ void WeldedMesh::joinVertices(const std::vector<HalfEdge>& open, double near) {
     Corners moved = corners[i];
     for (std::uint32_t& corner : moved)
       if (const auto found = becomes.find(corner); found != becomes.end()) corner = found->second;
-    const auto [t, sign] = ascending(moved);
-    if (t[0] != t[1] && t[1] != t[2]) all.push_back({t, static_cast<std::int8_t>(sign * winding[i])});
+    const WoundCorners t = inAscendingOrder(moved, winding[i]);
+    if (t.corners[0] != t.corners[1] && t.corners[1] != t.corners[2]) all.push_back(t);
   }
   build(std::move(all));
 }
@@ -114,34 +107,27 @@ bool WeldedMesh::splitEdges(double near) {
     std::sort(on_edge.begin(), on_edge.end());
     on_edge.push_back({0.0, to});
     // from the edge's vertices to its triangle's third one
-    std::vector<std::pair<Corners, int>> parts;
+    std::vector<WoundCorners> parts;
     std::uint32_t begin = from;
     for (const OnEdge& end : on_edge) {
       Corners part = corners[triangle];
       std::ranges::replace(part, to, end.vertex);
       if (begin != from) std::ranges::replace(part, from, begin);
-      parts.push_back(ascending(part));
+      parts.push_back(inAscendingOrder(part, winding[triangle]));
       begin = end.vertex;
     }
-    const auto triangleOf = [this](const Corners& c) {
-      return structures::Triangle{positions[c[0]], positions[c[1]], positions[c[2]]};
-    };
-    if (std::ranges::any_of(
-            parts, [&](const auto& part) { return !(structures::areaOf(triangleOf(part.first)) > 0.0); }))
+    std::vector<structures::Triangle> pieces;
+    for (const auto& [c, wound] : parts)
+      pieces.push_back({positions[c[0]], positions[c[1]], positions[c[2]]});
+    if (!std::ranges::all_of(pieces, [](const auto& piece) { return structures::areaOf(piece) > 0.0; }))
       continue;
-    const std::int8_t wound = winding[triangle];
-    for (std::size_t k = 0; k < parts.size(); ++k) {
-      const auto& [part, sign] = parts[k];
-      const auto wound_part = static_cast<std::int8_t>(sign * wound);
-      if (k == 0) {
-        corners[triangle] = part;
-        triangles[triangle] = triangleOf(part);
-        winding[triangle] = wound_part;
-        continue;
-      }
-      corners.push_back(part);
-      triangles.push_back(triangleOf(part));
-      winding.push_back(wound_part);
+    corners[triangle] = parts[0].corners;
+    winding[triangle] = parts[0].winding;
+    triangles[triangle] = pieces[0];
+    for (std::size_t k = 1; k < parts.size(); ++k) {
+      corners.push_back(parts[k].corners);
+      winding.push_back(parts[k].winding);
+      triangles.push_back(pieces[k]);
     }
     is_split[triangle] = 1;
     ++split;

@@ -129,16 +129,20 @@ WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
   std::vector<WoundCorners> all;
   all.reserve(mesh.triangles.size());
   for (const auto& [a, b, c] : mesh.triangles) {
-    Corners t{number[a], number[b], number[c]};
-    const bool same = ((t[0] < t[1]) + (t[1] < t[2]) + (t[2] < t[0])) == 2;
-    std::sort(t.begin(), t.end());
-    if (t[0] != t[1] && t[1] != t[2]) all.push_back({t, static_cast<std::int8_t>(same ? 1 : -1)});
+    const WoundCorners t = inAscendingOrder({number[a], number[b], number[c]}, 1);
+    if (t.corners[0] != t.corners[1] && t.corners[1] != t.corners[2]) all.push_back(t);
   }
   build(std::move(all));
   skipped = mesh.triangles.size() - triangles.size();
   stitch();
   closeHoles();
   winding.resize(triangles.size(), 0);
+}
+
+WeldedMesh::WoundCorners WeldedMesh::inAscendingOrder(Corners c, int winding) {
+  const bool same = ((c[0] < c[1]) + (c[1] < c[2]) + (c[2] < c[0])) == 2;
+  std::sort(c.begin(), c.end());
+  return {c, static_cast<std::int8_t>(same ? winding : -winding)};
 }
 
 void WeldedMesh::build(std::vector<WoundCorners> all) {

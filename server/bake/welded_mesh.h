@@ -64,6 +64,8 @@ struct WeldedMesh {
     std::int8_t winding;  // of the mesh's triangle, beside ascending order
     auto operator<=>(const WoundCorners&) const = default;
   };
+  /// A triangle with `winding` in the order of these corners.
+  [[nodiscard]] static WoundCorners inAscendingOrder(Corners corners, int winding);
   /// Replaces the triangles by `all`, without those that have no area or are there before.
   void build(std::vector<WoundCorners> all);
   /// The edges of all triangles, sorted by their vertices.
